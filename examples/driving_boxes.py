@@ -32,7 +32,7 @@ def read_labels(path: Path) -> tuple[list[str], npt.NDArray[np.int64], hizvk.Ori
     """Types, levels of occlusion and boxes; regions without labels (DontCare) are left out."""
     lines = path.read_text().splitlines()
     rows = [line.split() for line in lines if not line.startswith("DontCare")]
-    table = np.array([row[1:15] for row in rows], float)
+    table = np.array([row[1:15] for row in rows], float).reshape(-1, 14)
     half = table[:, [9, 7, 8]] / 2  # length, height, width
     centers = table[:, 10:13] - half * (0, 1, 0)  # y is down; a location is at the lower face
     boxes = hizvk.OrientedBoxes.from_yaw(centers, half, np.degrees(table[:, 13]), up=(0, 1, 0))

@@ -16,23 +16,26 @@ import numpy.typing as npt
 import hizvk
 
 TOWN = Path(__file__).parent / "data" / "town.city.json"
+#: Geometries that have surfaces: a solid has lists of them, its shells.
+SHAPES = ("Solid", "MultiSurface", "CompositeSurface")
 #: On the square, 1.6 m above the ground, in the file's coordinates; z is up.
 PLACES = [(x, y, 3.6) for x in (84_985.0, 85_000.0, 85_015.0) for y in (446_485.0, 446_505.0)]
 
 
 def read_surfaces(path: Path) -> tuple[list[str], list[list[npt.NDArray[np.float64]]]]:
-    """Of each surface of the solids: whose it is, and its rings of vertices."""
+    """Of each surface: whose it is, and its rings of vertices."""
     model = json.loads(path.read_text())
-    step = model["transform"]
+    step = model.get("transform", {"scale": 1.0, "translate": 0.0})
     vertices = np.array(model["vertices"]) * step["scale"] + step["translate"]
     names, surfaces = [], []
     for name, thing in model["CityObjects"].items():
-        solids = [each for each in thing.get("geometry", []) if each["type"] == "Solid"]
+        shapes = [each for each in thing.get("geometry", []) if each["type"] in SHAPES]
         # The finest level of detail: coarser ones may be larger, and would hide what shows.
-        for solid in sorted(solids, key=lambda each: float(each["lod"]))[-1:]:
-            for surface in (surface for shell in solid["boundaries"] for surface in shell):
-                names.append(name)
-                surfaces.append([vertices[ring] for ring in surface])
+        for shape in sorted(shapes, key=lambda each: float(each["lod"]))[-1:]:
+            parts = shape["boundaries"]
+            for shell in parts if shape["type"] == "Solid" else [parts]:
+                names += [name] * len(shell)
+                surfaces += [[vertices[ring] for ring in rings] for rings in shell]
     return names, surfaces
 
 

@@ -7,6 +7,8 @@
 from __future__ import annotations
 
 import importlib.util
+import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -154,6 +156,33 @@ def explanation(path: Path) -> None:
     lesson()[2].plot().savefig(path, dpi=70)
 
 
+def turning(path: Path) -> None:
+    """What a browser shows of `seen.save_html(...)`; needs Chromium."""
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        print(f"{path.name}: not drawn without chromium")
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "seen.html"
+        lesson()[1].save_html(page)
+        subprocess.run(
+            [
+                browser,
+                "--headless",
+                "--no-sandbox",
+                "--use-angle=swiftshader",
+                "--enable-unsafe-swiftshader",
+                "--window-size=1100,600",
+                "--virtual-time-budget=3000",
+                f"--screenshot={path}",
+                page.as_uri(),
+            ],
+            check=True,
+            capture_output=True,
+            timeout=120,
+        )
+
+
 PICTURES = {
     "driving": driving,
     "points": points,
@@ -161,6 +190,7 @@ PICTURES = {
     "pyramid": pyramid,
     "result": result,
     "explanation": explanation,
+    "turning": turning,
 }
 
 

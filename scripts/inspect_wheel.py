@@ -18,7 +18,10 @@ PLATFORMS = re.compile(r"manylinux_2_28_(x86_64|aarch64)|macosx_\d+_\d+_(x86_64|
 PARTS = ("wgpu", "wgpu-core", "naga", "pyo3", "numpy", "hiz_core", "hiz_ref")
 # The module on Linux and macOS, and on Windows.
 MODULES = ("hizvk/_core.abi3.so", "hizvk/_core.pyd")
-EXPECTED = {"hizvk/__init__.py", "hizvk/_core.pyi", "hizvk/py.typed"}
+EXPECTED = {
+    "hizvk/__init__.py", "hizvk/_core.pyi", "hizvk/py.typed", "hizvk/show/web.html",
+    "hizvk/show/web.js",
+}  # fmt: skip
 # The features of crates/hiz_py that a wheel is built without, and what only they put into a module.
 DEVELOPERS_WORDS = {"testing": b"HIZVK_PLANTED_FAULT", "yardstick": b"Yardstick"}
 # Libraries that every Linux system has.

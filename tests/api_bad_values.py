@@ -949,6 +949,30 @@ TABLES: dict[str, Table] = {
             "sampling": SAMPLING,
         },
     ),
+    "fill_depth": Table(
+        lambda _: (hizvk.fill_depth, {"depth": np.ones((6, 8)), "radius_px": 2, "kind": "z"}),
+        {
+            "depth": [
+                (np.ones(48), ValueError, "expected float (height, width), or whole numbers of 16"),
+                (np.ones((6, 8), np.uint8), TypeError, "got (6, 8) uint8"),
+                (np.ones((6, 8), bool), TypeError, "got (6, 8) bool"),
+                (np.full((6, 8), 2**60), ValueError, "which float64 cannot hold"),
+                ([[1.0, 2.0], [3.0]], ValueError, "no array"),
+                ("depth", TypeError, "got ndarray array('depth'"),
+                (None, TypeError, "got ndarray array(None"),
+            ],
+            "radius_px": [
+                (-1, ValueError, "expected an integer in 0..1024, got int -1"),
+                (1025, ValueError, "got int 1025"),
+                (2.0, TypeError, "got float 2.0"),
+            ],
+            "kind": [
+                ("ndc", ValueError, 'expected one of "z", "distance", got str \'ndc\''),
+                (None, TypeError, "got None"),
+            ],
+            "invalid": INVALID,
+        },
+    ),
     "depth_from_points": Table(
         lambda _: (
             hizvk.depth_from_points,
@@ -1796,6 +1820,19 @@ TABLES: dict[str, Table] = {
             "kept_within": [
                 (0.9, ValueError, "at least 1, got float 0.9"),
                 (None, TypeError, "got None"),
+            ],
+            "meshes": [
+                (3, TypeError, "expected a sequence of MeshLods or None, got int 3"),
+                ([], ValueError, "expected at least one MeshLods, got none"),
+            ],
+            "mesh_ids": [
+                ([0, 1], ValueError, "expected integer (1,), got (2,) int64"),
+                ([0.5], TypeError, "got (1,) float64"),
+            ],
+            "lods": [([hizvk.LodByError(1)], TypeError, "expected None without meshes")],
+            "max_seconds": [
+                (-1.0, ValueError, "at least 0, got float -1.0"),
+                ("10", TypeError, "got str '10'"),
             ],
             "repetitions": [
                 (0, ValueError, "in 1..10000, got int 0"),

@@ -134,7 +134,10 @@ def _wrong_pytest(words: list[str]) -> str | None:
 
 def _wrong_python(words: list[str]) -> str | None:
     if words[0] == "-m":
-        return _wrong_options(("-m", words[1]), words[2:])
+        module, rest = words[1], words[2:]
+        # A first word without dashes is a command of its own.
+        commands = rest[:1] if rest and not rest[0].startswith("-") else []
+        return _wrong_options(("-m", module, *commands), rest[len(commands) :])
     return None if (ROOT / words[0]).is_file() else f"{words[0]}: no such file"
 
 

@@ -87,6 +87,7 @@ ARRAYS = [
     ("Camera.resized", "size"),
     ("Camera.project", "xyz"),
     ("gather", "pixels"),
+    ("fill_depth", "depth"),
     ("DirectionalLight", "direction"),
     ("cube", "eye"),
     ("sweep", "groups"),

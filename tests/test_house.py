@@ -112,30 +112,32 @@ def test_the_graph_sees_a_circle(
     assert circles(graph(tmp_path)) == expected
 
 
-def test_import_loads_no_tools() -> None:
-    """A cull needs no benchmark, no scenes and no pictures."""
-    code = "import sys, hizvk; print(*sorted(sys.modules))"
+def loaded_by(code: str) -> set[str]:
+    """The modules that the code loads in a new process, beside those of NumPy."""
+    code = f"import sys, numpy; old = {{*sys.modules}}; {code}; print(*{{*sys.modules}} - old)"
     done = subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
     )
-    loaded = set(done.stdout.split())
-    tools = (
-        "methods",
-        "recommendation",
-        "sweeping",
-        "measuring",
-        "bench",
-        "demo",
-        "scenes",
-        "show",
-        "commands",
-        "cli",
-    )
+    return set(done.stdout.split())
+
+
+def test_an_import_loads_next_to_nothing() -> None:
+    """Seconds depend on the machine, so modules are counted: with 70 of them it took 25 ms."""
+    loaded = loaded_by("import hizvk")
+    ours = {name for name in loaded if name.split(".")[0] == "hizvk"}
+    assert ours == {"hizvk", "hizvk._core", "hizvk._processes", "hizvk.errors"}
+    assert len(loaded) <= 12, loaded
+
+
+def test_a_cull_loads_no_tools() -> None:
+    """It needs no benchmark, no scenes and no pictures."""
+    loaded = loaded_by("import hizvk; hizvk.Device, hizvk.Camera, hizvk.Boxes, hizvk.visible")
+    tools = ("recommendation", "measuring", "bench", "demo", "scenes", "commands", "cli", "check")
     strangers = {
         name
         for name in loaded
         if name.split(".")[0] in ("matplotlib", "embreex", "PIL", "scipy", "trimesh")
-        or (name.startswith("hizvk.") and name.split(".")[1] in tools)
+        or (name.startswith("hizvk.") and name.split(".")[1] in (*tools, "occluders", "methods"))
     }
     assert "hizvk.device" in loaded
     assert not strangers
@@ -153,6 +155,16 @@ def test_nothing_uses_the_methods() -> None:
         and any(module.startswith("hizvk.methods") for module in imported)
     }
     assert users <= {"hizvk", "hizvk.device"}
+
+
+def test_every_public_name_is_there_when_it_is_asked_for() -> None:
+    code = (
+        "import hizvk; names = [getattr(hizvk, name) for name in hizvk.__all__]; "
+        "assert {*hizvk.__all__} <= {*dir(hizvk)}; "
+        "assert hizvk.camera.Camera is hizvk.Camera; "
+        "assert not hasattr(hizvk, 'no_such_name')"
+    )
+    loaded_by(code)
 
 
 def test_recommend_comes_when_it_is_asked_for() -> None:

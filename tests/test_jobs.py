@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 import documented
@@ -40,6 +41,67 @@ def test_the_data_are_what_their_script_makes() -> None:
     """If this is red, run scripts/example_data.py."""
     made = load(ROOT / "scripts" / "example_data.py").files()
     assert {path.name: path.read_text(encoding="utf-8") for path in DATA.iterdir()} == made
+
+
+def test_labels_may_be_few(tmp_path: Path) -> None:
+    """A frame without objects, a result file with scores, and a region that is left out."""
+    example = load(ROOT / "examples" / "driving_boxes.py")
+    path = tmp_path / "label.txt"
+    ignored = "DontCare -1 -1 -10 1 2 3 4 -1 -1 -1 -1000 -1000 -1000 -10"
+    for lines, count in (([], 0), ([ignored], 0)):
+        path.write_text("\n".join(lines), encoding="utf-8")
+        names, levels, boxes = example.read_labels(path)
+        assert len(names) == len(levels) == len(boxes) == count
+    car = "Car 0.00 0 -1.58 10 10 20 20 1.50 1.60 4.00 1.00 1.70 20.00 0.00 0.99"
+    path.write_text(f"{ignored}\n{car}\n", encoding="utf-8")
+    names, _, boxes = example.read_labels(path)
+    assert names == ["Car"]
+    # Length along x, height along y (down), width along z; the location is on the ground.
+    assert boxes.half_sizes.tolist() == [[2.0, 0.75, 0.8]]
+    assert np.allclose(boxes.centers, [[1.0, 0.95, 20.0]])
+
+
+def test_cityjson_may_be_of_other_kinds(tmp_path: Path) -> None:
+    """Surfaces without a solid or a transform, several levels of detail, holes and corners."""
+    example = load(ROOT / "examples" / "model_visibility.py")
+    path = tmp_path / "some.city.json"
+    square, angle = [0, 1, 2, 3], [0, 1, 4, 3]
+    fine = {"type": "MultiSurface", "lod": "2", "boundaries": [[square], [angle], [square, angle]]}
+    coarse = {"type": "Solid", "lod": 1.2, "boundaries": [[[square]]]}
+    point = {"type": "MultiPoint", "lod": "3", "boundaries": [0]}
+    model = {
+        "type": "CityJSON",
+        "CityObjects": {
+            "part": {"type": "BuildingPart", "geometry": [fine, point, coarse]},
+            "parent": {"type": "Building"},
+        },
+        "vertices": [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [1, 1, 0]],
+    }
+    path.write_text(json.dumps(model), encoding="utf-8")
+    names, surfaces = example.read_surfaces(path)
+    assert names == ["part"] * 3
+    assert [len(rings) for rings in surfaces] == [1, 1, 2]
+    # The square is a fan; the angle, whose corner turns inwards, and the hole are none.
+    assert [len(example.fan(rings)) for rings in surfaces] == [2, 0, 0]
+
+
+def test_the_gallery_has_a_command_for_each_picture() -> None:
+    """Every picture of a job is drawn by one name of scripts/gallery.py, or by the renderer."""
+    parts = re.split(r"^## ", page("gallery.md"), flags=re.MULTILINE)[1:]
+    shown = []
+    for part in parts:
+        (picture,) = re.findall(r"\]\(images/(\w+)\.png\)", part)
+        assert re.search(r"^```sh\n.+?^```$", part, re.MULTILINE | re.DOTALL), part
+        if picture.startswith("job_"):
+            name = picture.removeprefix("job_")
+            assert f"gallery.py {name}" in part or f"images/{picture}.png\n```" in part, part
+        shown.append(picture)
+    jobs = {path.stem for path in (ROOT / "docs" / "images").glob("job_*.png")}
+    assert jobs <= set(shown)
+    drawn = re.findall(
+        r"^    \"(\w+)\": ", (ROOT / "scripts" / "gallery.py").read_text(), re.MULTILINE
+    )
+    assert jobs == {f"job_{name}" for name in drawn} | {"job_renderer"}
 
 
 JOBS = ("driving", "points", "models", "renderer", "class")
@@ -122,6 +184,21 @@ def test_nothing_that_a_ray_sees_is_lost_in_the_town() -> None:
     assert not (shown & ~kept).any()
     # It culls: about half of the surfaces, which no ray finds.
     assert 0.3 < kept.mean() < 0.7
+
+
+def test_a_glb_file_hides_what_the_page_says(tmp_path: Path) -> None:
+    """The house of the page by way of a file, whose node turns and moves it."""
+    trimesh = pytest.importorskip("trimesh", reason="it writes and reads the file")
+    house = trimesh.creation.box(extents=(3.0, 4.0, 4.0))
+    place = np.array([[0.0, -1, 0, 0], [1, 0, 0, 1.5], [0, 0, 1, -10], [0, 0, 0, 1]])
+    scene = trimesh.Scene()
+    scene.add_geometry(house, transform=place)
+    scene.export(tmp_path / "house.glb")
+    read = trimesh.load(tmp_path / "house.glb", force="scene").to_mesh()
+    things = hizvk.Spheres([(0.0, 1.0, -16.0), (0.0, 5.0, -16.0), (9.0, 1.0, 0.0)], 0.5)
+    cameras = hizvk.cube((0.0, 1.7, 0.0), size=256, near=0.1)
+    seen = hizvk.sweep(things, cameras, occluders=read, conservative=True, groups=[0] * 6)
+    assert seen.mask(0).tolist() == [False, True, True]
 
 
 LESSON = ROOT / "examples" / "lesson.ipynb"

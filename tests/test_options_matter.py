@@ -97,6 +97,14 @@ CULLS: dict[str, tuple[Any, Any, dict[str, Any], dict[str, Any]]] = {
         {"footprint": 4},
         {"footprint": 2},
     ),
+    # Two pixels, columns 9 and 10, which no border of a texel parts but that of level 1.
+    # The one texel that encloses them is of level 2, and contains the open column 8.
+    "footprint 1": (
+        box((1.1, 0.1, -8), (2.9, 0.9, -8)),
+        HOLE_COLUMN,
+        {"footprint": 2},
+        {"footprint": 1},
+    ),
     "footprint 8": (
         box((1.1, -1.9, -8), (6.9, 0.9, -8)),
         HOLE_COLUMN,

@@ -62,23 +62,9 @@ Everything that the device refuses is a `HizError`.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from . import reference
+# The compiled module comes first: devices are let go of after whatever was registered later.
 from ._core import __version__
-from .adapter import Adapter, adapters
-from .approximate import ApproximateResult
-from .bounds import Boxes, OrientedBoxes, Points, Spheres
-from .camera import Camera
-from .check import (
-    BoundsCheck,
-    Comparison,
-    ProxyCheck,
-    UnoccludedComparison,
-    check_bounds,
-    check_proxy,
-    compare,
-    compare_unoccluded,
-)
-from .device import Device
+from ._processes import driver_is_asked as _driver_is_asked  # noqa: F401 - it minds forks
 from .errors import (
     DeviceLostError,
     HizError,
@@ -87,35 +73,28 @@ from .errors import (
     NoAdapterError,
     OutOfMemoryError,
 )
-from .explanation import Explanation, Verdict
-from .light import DirectionalLight
-from .lod import LodByDistance, LodByError, LodBySize
-from .mesh import Mesh
-from .mips import mip_texel, wgsl
-from .occluders import (
-    InnerBoxes,
-    InnerPrisms,
-    OccluderSelection,
-    SplitMesh,
-    inner_boxes,
-    inner_prisms,
-    select_occluders,
-    split_mesh,
-)
-from .oneline import visible
-from .options import CullOptions, DrawTemplate, MeshLods, Outputs
-from .pixels import PIXELS_DTYPE, visible_fraction
-from .points import PointColours, colour_points, depth_from_points
-from .projection import Projected, gather
-from .resources import DepthImage, Instances, Occluders, Pyramid
-from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
-from .stats import CullStats
-from .temporal import PassResult, Temporal
-from .timing import StageTime, StageTimes
-from .tolerance import Tolerance
-from .views import ViewsResult
 
 if TYPE_CHECKING:
+    from . import reference
+    from .adapter import Adapter, adapters
+    from .approximate import ApproximateResult
+    from .bounds import Boxes, OrientedBoxes, Points, Spheres
+    from .camera import Camera
+    from .check import (
+        BoundsCheck,
+        Comparison,
+        ProxyCheck,
+        UnoccludedComparison,
+        check_bounds,
+        check_proxy,
+        compare,
+        compare_unoccluded,
+    )
+    from .device import Device
+    from .explanation import Explanation, Verdict
+    from .light import DirectionalLight
+    from .lod import LodByDistance, LodByError, LodBySize
+    from .mesh import Mesh
     from .methods import (
         BspTiling,
         HierarchicalVisibility,
@@ -125,8 +104,32 @@ if TYPE_CHECKING:
         PublishedTest,
         TiledCoverage,
     )
+    from .mips import mip_texel, wgsl
+    from .occluders import (
+        InnerBoxes,
+        InnerPrisms,
+        OccluderSelection,
+        SplitMesh,
+        inner_boxes,
+        inner_prisms,
+        select_occluders,
+        split_mesh,
+    )
+    from .oneline import visible
+    from .options import CullOptions, DrawTemplate, MeshLods, Outputs
+    from .pixels import PIXELS_DTYPE, visible_fraction
+    from .points import PointColours, colour_points, depth_from_points
+    from .projection import Projected, gather
     from .recommendation import Recommendation, recommend
+    from .resources import DepthImage, Instances, Occluders, Pyramid
+    from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
+    from .sparse import fill_depth
+    from .stats import CullStats
     from .sweeping import Sweep, SweepInterrupted, cube, sweep, viewshed, visible_sets
+    from .temporal import PassResult, Temporal
+    from .timing import StageTime, StageTimes
+    from .tolerance import Tolerance
+    from .views import ViewsResult
 
 __all__ = [
     "ABSENT",
@@ -199,6 +202,7 @@ __all__ = [
     "compare_unoccluded",
     "cube",
     "depth_from_points",
+    "fill_depth",
     "gather",
     "inner_boxes",
     "inner_prisms",
@@ -216,31 +220,99 @@ __all__ = [
 ]
 
 
-#: Names that are loaded at their first use, with their packages: a cull does not need them.
+#: Where the other names come from.
+#: They are loaded at their first use, so that an import costs little, and a cull no more than it
+#: needs.
 _LATER = {
+    "ABSENT": "result",
+    "Adapter": "adapter",
+    "ApproximateResult": "approximate",
+    "BoundsCheck": "check",
+    "Boxes": "bounds",
     "BspTiling": "methods",
+    "Camera": "camera",
+    "Comparison": "check",
+    "CullOptions": "options",
+    "CullResult": "result",
+    "CullStats": "stats",
+    "DRAW_DTYPE": "result",
+    "DepthImage": "resources",
+    "Device": "device",
+    "DirectionalLight": "light",
+    "DrawTemplate": "options",
+    "Explanation": "explanation",
     "HierarchicalVisibility": "methods",
     "HierarchyFrame": "methods",
+    "InnerBoxes": "occluders",
+    "InnerPrisms": "occluders",
+    "Instances": "resources",
+    "LodByDistance": "lod",
+    "LodByError": "lod",
+    "LodBySize": "lod",
     "MapResult": "methods",
+    "Mesh": "mesh",
+    "MeshLods": "options",
+    "NO_LOD": "result",
+    "OccluderSelection": "occluders",
+    "Occluders": "resources",
     "OcclusionMap": "methods",
+    "OrientedBoxes": "bounds",
+    "Outputs": "options",
+    "PIXELS_DTYPE": "pixels",
+    "PassResult": "temporal",
+    "PointColours": "points",
+    "Points": "bounds",
+    "Projected": "projection",
+    "ProxyCheck": "check",
     "PublishedTest": "methods",
-    "TiledCoverage": "methods",
+    "Pyramid": "resources",
     "Recommendation": "recommendation",
-    "recommend": "recommendation",
+    "Spheres": "bounds",
+    "SplitMesh": "occluders",
+    "StageTime": "timing",
+    "StageTimes": "timing",
     "Sweep": "sweeping",
     "SweepInterrupted": "sweeping",
+    "Temporal": "temporal",
+    "TiledCoverage": "methods",
+    "Tolerance": "tolerance",
+    "UnoccludedComparison": "check",
+    "Verdict": "explanation",
+    "ViewsResult": "views",
+    "adapters": "adapter",
+    "check_bounds": "check",
+    "check_proxy": "check",
+    "colour_points": "points",
+    "compare": "check",
+    "compare_unoccluded": "check",
     "cube": "sweeping",
+    "depth_from_points": "points",
+    "fill_depth": "sparse",
+    "gather": "projection",
+    "inner_boxes": "occluders",
+    "inner_prisms": "occluders",
+    "mip_texel": "mips",
+    "recommend": "recommendation",
+    "select_occluders": "occluders",
+    "split_mesh": "occluders",
     "sweep": "sweeping",
     "viewshed": "sweeping",
+    "visible": "oneline",
+    "visible_fraction": "pixels",
     "visible_sets": "sweeping",
+    "wgsl": "mips",
 }
+#: Modules that are attributes of the package without an import of their own.
+_MODULES = {*_LATER.values(), "progress", "reference"}
 
 
 def __getattr__(name: str) -> Any:
-    """The names of `_LATER`, loaded at their first use."""
+    """The names of `_LATER` and the modules, loaded at their first use."""
     if name in _LATER:
         globals()[name] = getattr(import_module(f".{_LATER[name]}", __name__), name)
         return globals()[name]
+    if name in _MODULES:
+        return import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

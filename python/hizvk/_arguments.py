@@ -46,7 +46,7 @@ def describe(value: object) -> str:
         return f"{_shape_text(value.shape)} {value.dtype}"
     if value is None:
         return "None"
-    if hasattr(value, "__dlpack__"):
+    if hasattr(value, "__dlpack__") and not isinstance(value, (np.ndarray, np.generic)):
         return foreign.described(value)
     text = repr(value)
     if len(text) > 60:

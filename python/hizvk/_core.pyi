@@ -553,6 +553,7 @@ class MethodLevels:
         engine: Engine,
         way: str,
         shape: tuple[int, int],
+        camera: Camera,
         images: Sequence[npt.NDArray[np.float32]],
     ) -> Self: ...
     def run(self) -> None: ...

@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 #: How many texels per side a test may read of one level.
-FOOTPRINTS: Final = (2, 4, 8)
+FOOTPRINTS: Final = (1, 2, 4, 8)
 #: What a cull can make, by name.
 OUTPUTS: Final = words(Output)
 _LARGEST_U32: Final = 2**32 - 1
@@ -83,9 +83,9 @@ def _guard(name: str, value: object) -> float | None:
 
 
 def _footprint(name: str, value: object) -> int:
-    footprint = _arguments.integer(name, value, low=2, high=8)
+    footprint = _arguments.integer(name, value, low=1, high=8)
     if footprint not in FOOTPRINTS:
-        raise ValueError(f"{name}: expected one of 2, 4, 8, got {footprint}")
+        raise ValueError(f"{name}: expected one of 1, 2, 4, 8, got {footprint}")
     return footprint
 
 
@@ -282,9 +282,11 @@ class CullOptions:
     transform_slack : float
         For depth images of a renderer that transforms in float32: how many ulps its matrix product
         may have cost, 0 to 1e6; about 4 for such a renderer.
-    footprint : 2, 4 or 8
+    footprint : 1, 2, 4 or 8
         How many texels per side a test may read of one level.
         More texels mean a finer level, so less is kept and more is read.
+        1 is the finest single texel that encloses the bounds' rectangle; with a descent from there
+        the answer is that of 2 and a descent.
     descent : int
         How many texels of finer levels a test may read where the footprint cannot decide, 0 to
         65536.

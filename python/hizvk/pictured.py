@@ -231,7 +231,7 @@ class PicturedResult(_Shown):
             The file; what is there is replaced.
         bounds : Spheres, Boxes, OrientedBoxes or Points, optional
             As for `plot`.
-        occluders : Mesh, mesh of another library, or a list of them; optional
+        occluders : Mesh or list of them, also of another library; optional
             What hides things, to be shown as triangles; at most 40,000, the largest ones.
         up : {"x", "y", "z", "-x", "-y", "-z"}, optional
             As for `plot`.

@@ -16,7 +16,6 @@ from .mesh import placed
 from .pictured import PicturedDepth, PicturedPyramid
 from .remembered import Remembered
 from .renewal import rectangle, replacement
-from .view_depth import converted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -205,6 +204,15 @@ class Occluders(Allocated[CoreOccluders]):
         return f": {self.num_meshes} meshes, {self.num_triangles} triangles"
 
 
+def _converted(
+    camera: Camera, depth: npt.NDArray[np.float32], kind: DepthKind, level: int, end: DepthEnd
+) -> npt.NDArray[np.float32]:
+    """Depth of another kind than the camera's own."""
+    from .view_depth import converted  # culls need none of it
+
+    return converted(camera, depth, kind, level, end)
+
+
 class _Seen:
     """What belongs to one camera, and has the size of its image."""
 
@@ -251,7 +259,8 @@ class DepthImage(PicturedDepth, _Seen, OnDevice[CoreDepthImage]):
         TypeError, ValueError
             They name the parameter, what it expects and what came.
         """
-        return converted(self._camera, self._inner.read().reshape(self.size), kind)
+        depth = self._inner.read().reshape(self.size)
+        return depth if kind is None else _converted(self._camera, depth, kind, 0, "farthest")
 
     def _summary(self) -> str:
         return f" {self.size[0]}x{self.size[1]} of kind {self.kind}"
@@ -352,7 +361,8 @@ class Pyramid(PicturedPyramid, _Seen, Allocated[CorePyramid]):
         if k > 0 and k not in self.levels:
             raise IndexError(f"k: expected 0 or a level that is stored, {self._stored()}, got {k}")
         size, texels = self._inner.read_level(k, end == "nearest")
-        return converted(self._camera, texels.reshape(size), kind, k, end)
+        texels = texels.reshape(size)
+        return texels if kind is None else _converted(self._camera, texels, kind, k, end)
 
     def mips(
         self, *, depths: MipDepths = "farthest", lookup: MipLookup = "normalized"

@@ -77,14 +77,23 @@ def fill_depth(
     radius = _arguments.integer("radius_px", radius_px, low=0, high=LARGEST_RADIUS)
     kind = _arguments.choice("kind", kind, METRIC)  # type: ignore[assignment]
     expected = "float (height, width), or whole numbers of 16 bits or more"
-    mask = np.ma.getmaskarray(np.ma.array(depth)) if _arguments.is_masked(depth) else None
-    array = np.asarray(foreign.as_numpy("depth", expected, np.ma.getdata(depth)))
+    mask = None
+    if _arguments.is_masked(depth):
+        depth = np.ma.array(depth)  # numpy.asarray would drop the masks of rows
+        mask = None if depth.mask is np.ma.nomask else np.asarray(depth.mask)
+        depth = depth.data
+    depth = foreign.as_numpy("depth", expected, depth)
+    try:
+        array = np.asarray(depth)
+    except ValueError as error:
+        raise ValueError(f"depth: expected {expected}, got no array ({error})") from None
     if array.ndim == 3 and array.shape[2] == 1:
         array, mask = array[..., 0], None if mask is None else mask[..., 0]
     if array.dtype.kind not in "iuf" or array.dtype.itemsize == 1:
         raise TypeError(f"depth: expected {expected}, got {_arguments.describe(array)}")
     if array.ndim != 2:
         raise ValueError(f"depth: expected {expected}, got {_arguments.describe(array)}")
+    array = _arguments.copied("depth", array, array.dtype.newbyteorder("="))
     array = whole_numbers("depth", array, kind, invalid)
     known = np.isfinite(array) & (array > 0)
     for number in no_data_of(invalid, array.dtype):
@@ -104,7 +113,7 @@ def fill_depth(
 
 
 def _farthest_after(depth: npt.NDArray[Any], radius: int) -> npt.NDArray[Any]:
-    """The farthest depth of each row and the `radius` rows after it; windows double in each step."""
+    """The farthest depth of each row and the `radius` rows after it; windows double each time."""
     found = depth.copy(order="K")
     rows = 1
     while rows <= radius:

@@ -19,8 +19,13 @@ fn leading_bit(v: u32) -> u32 {
 // The finest level at which the pixels first..=last span no more texels than the footprint.
 // It is found with integers alone, because log2 may round.
 fn finest_level(first: vec2<u32>, last: vec2<u32>) -> u32 {
+    if FOOTPRINT_LOG2 == 0u {
+        // One texel encloses pixels whose numbers differ in their last bits alone.
+        let apart = (first.x ^ last.x) | (first.y ^ last.y);
+        return select(leading_bit(apart | 1u) + 1u, 0u, apart == 0u);
+    }
     let pixels = last - first;
-    let side = FOOTPRINT_LOG2 - 1u;
+    let side = max(FOOTPRINT_LOG2, 1u) - 1u;
     let level = max(leading_bit(pixels.x | pixels.y | 1u), side) - side;
     let texels = (last >> vec2<u32>(level)) - (first >> vec2<u32>(level));
     return level + select(0u, 1u, (texels.x | texels.y) >= (1u << FOOTPRINT_LOG2));

@@ -11,6 +11,8 @@ use hiz_core::{Coverage, Fit, Footprint, StoredLevels};
 
 /// Every footprint, and descents with and without enough budget to finish.
 const ALL: &[(Footprint, u32)] = &[
+    (Footprint::One, 0),
+    (Footprint::One, 4096),
     (Footprint::Two, 0),
     (Footprint::Two, 0),
     (Footprint::Eight, 0),

@@ -19,8 +19,13 @@ use hiz_ref::{Verdict, View, Volume};
 use mirror::{Arithmetic, MARGIN_FIRST, Margins, Mirror, STYLES, Style, WITHOUT_BARS};
 
 /// Every footprint.
-const FOOTPRINTS: &[(Footprint, u32)] =
-    &[(Footprint::Two, 0), (Footprint::Two, 0), (Footprint::Four, 0), (Footprint::Eight, 0)];
+const FOOTPRINTS: &[(Footprint, u32)] = &[
+    (Footprint::One, 0),
+    (Footprint::Two, 0),
+    (Footprint::Two, 0),
+    (Footprint::Four, 0),
+    (Footprint::Eight, 0),
+];
 
 /// False culls by margin and style.
 struct Power {

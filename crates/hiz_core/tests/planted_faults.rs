@@ -110,6 +110,17 @@ fn a_level_too_fine_without_block_certificates() {
     assert_red("level", &[finer, (INSIDE_X, "true"), (INSIDE_Y, "true")]);
 }
 
+/// One texel of a level where two are spanned.
+#[test]
+fn a_single_texel_too_fine_without_block_certificates() {
+    const ONE: &[(Footprint, u32)] = &[(Footprint::One, 0)];
+    let finer = ("leading_bit(apart | 1u) + 1u", "leading_bit(apart | 1u)");
+    let block = "let t = vec4<u32>(first >> vec2<u32>(level), last >> vec2<u32>(level));";
+    let one = (block, "let t = (first >> vec2<u32>(level)).xyxy;");
+    let faults = [finer, one, (INSIDE_X, "true"), (INSIDE_Y, "true")];
+    assert_red_with("one texel", &faults, ONE);
+}
+
 #[test]
 fn nearest_instead_of_farthest() {
     assert_red(

@@ -17,7 +17,7 @@ use hiz_core::{
 };
 
 const ALL: &[(Footprint, u32)] =
-    &[(Footprint::Two, 0), (Footprint::Eight, 0), (Footprint::Two, 64)];
+    &[(Footprint::One, 0), (Footprint::Two, 0), (Footprint::Eight, 0), (Footprint::Two, 64)];
 
 fn campaign(seed: u64, rounds: usize) -> Campaign {
     Campaign { seed, rounds, kinds: &POINTS, modes: ALL, ..Campaign::default() }

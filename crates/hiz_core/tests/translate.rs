@@ -25,7 +25,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("FARTHEST", FLAG),
     ("FIRST", ONE_TO_THREE),
     ("FIT_VOLUME", FLAG),
-    ("FOOTPRINT_LOG2", ONE_TO_THREE),
+    ("FOOTPRINT_LOG2", &[0.0, 1.0, 2.0, 3.0]),
     ("FROM_SOURCE", FLAG),
     ("INDEXED", FLAG),
     ("INDEX_TEXEL", ONE_TO_THREE),

@@ -21,8 +21,14 @@ use mirror::{Arithmetic, Mirror, STYLES};
 
 const DESCENT: &[(Footprint, u32)] = &[(Footprint::Two, 4096)];
 const SHORT: &[(Footprint, u32)] = &[(Footprint::Two, 1)];
-const ALL_MODES: &[(Footprint, u32)] =
-    &[(Footprint::Two, 0), (Footprint::Four, 0), (Footprint::Two, 4096), (Footprint::Eight, 4)];
+const ALL_MODES: &[(Footprint, u32)] = &[
+    (Footprint::One, 0),
+    (Footprint::One, 4096),
+    (Footprint::Two, 0),
+    (Footprint::Four, 0),
+    (Footprint::Two, 4096),
+    (Footprint::Eight, 4),
+];
 
 const BOXES: &[BoundsKind] = &[BoundsKind::Box];
 const SPHERES: &[BoundsKind] = &[BoundsKind::Sphere];

@@ -344,6 +344,9 @@ fn explain_tells_what_was_read() {
         let pyramid = engine().pyramid(&engine().upload_depth(&depth, &camera).unwrap()).unwrap();
         let levels: Vec<_> = (0..7).map(|k| engine().read_level(&pyramid, k).unwrap()).collect();
         for (footprint, descent, fit) in [
+            (Footprint::One, 0, Fit::Rectangle),
+            (Footprint::One, 4096, Fit::Rectangle),
+            (Footprint::One, 4096, Fit::Volume),
             (Footprint::Two, 0, Fit::Rectangle),
             (Footprint::Four, 0, Fit::Rectangle),
             (Footprint::Eight, 0, Fit::Rectangle),

@@ -48,6 +48,7 @@ pub(crate) fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
         depth_slack_abs: given.getattr("depth_slack_abs")?.extract()?,
         transform_slack: given.getattr("transform_slack")?.extract()?,
         footprint: match given.getattr("footprint")?.extract()? {
+            1 => Footprint::One,
             2 => Footprint::Two,
             4 => Footprint::Four,
             8 => Footprint::Eight,

@@ -25,9 +25,12 @@ def can_draw() -> bool:
 
 def sheet(width: float, height: float, *, dpi: int = 100) -> Any:
     """An empty figure; `width` and `height` are in inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), dpi=dpi, layout="constrained")
+    made = Figure(figsize=(width, height), dpi=dpi, layout="constrained")
+    FigureCanvasAgg(made)  # it can say where its texts lie
+    return made
 
 
 def save(figure: Any, title: str, path: Path) -> None:

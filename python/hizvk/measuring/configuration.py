@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from .._arguments import Size
-    from .._types import Levels, Rasteriser
+    from .._types import Depths, Levels, Rasteriser
+    from ..lod import LodRule
     from ..options import CullOptions
 
 __all__ = ["DESCENT", "READS", "SOME_LEVELS", "Configuration", "DepthVariant"]
@@ -33,6 +34,12 @@ class DepthVariant:
     """Which levels of the pyramid are built, as in `Device.pyramid`."""
     rasteriser: Rasteriser = "auto"
     """What draws a plain image, as in `Device.render_depth`."""
+    max_triangles: int | None = None
+    """At most so many triangles are drawn in each view, as in `Device.render_depth`."""
+    selected: int | None = None
+    """The occluders are those of `select_occluders`, with at most so many triangles."""
+    depths: Depths = "farthest"
+    """Which ends the pyramid has, as in `Device.pyramid`."""
 
     def size(self, full: Size) -> Size:
         """``(height, width)`` of the image for a view of `full` pixels."""
@@ -42,11 +49,19 @@ class DepthVariant:
         """The keyword arguments of `Device.render_depth` for a view of `full` pixels."""
         options: dict[str, Any] = {} if self.divisor == 1 else {"size": self.size(full)}
         options |= {} if self.rasteriser == "auto" else {"rasteriser": self.rasteriser}
+        options |= {} if self.max_triangles is None else {"max_triangles": self.max_triangles}
         return options | ({"conservative": True} if self.conservative else {})
 
     def __str__(self) -> str:
-        drawn = "" if self.rasteriser == "auto" else f"drawn by {self.rasteriser}"
-        return ", ".join(word for word in (self._image(), drawn, self._levels()) if word)
+        words = [self._image()]
+        words += [] if self.rasteriser == "auto" else [f"drawn by {self.rasteriser}"]
+        if self.max_triangles is not None:
+            words.append(f"at most {self.max_triangles:,} triangles drawn")
+        if self.selected is not None:
+            words.append(f"at most {self.selected:,} triangles selected")
+        words.append(self._levels())
+        words += [] if self.depths == "farthest" else [f"{self.depths} ends"]
+        return ", ".join(word for word in words if word)
 
     def _image(self) -> str:
         if self.divisor == 1:
@@ -61,9 +76,13 @@ class DepthVariant:
             return f"levels >= {first}"
         return f"level {first} alone" if first == last else f"levels {first} to {last}"
 
-    def cost(self) -> tuple[int, bool, str, str]:
+    def image(self) -> DepthVariant:
+        """The variant of the image alone, whatever its pyramid."""
+        return replace(self, levels=None, depths="farthest")
+
+    def cost(self) -> tuple[int, bool, str, str, str]:
         """A key for sorting: the largest image first, and of its pyramids that of all levels."""
-        return self.divisor, self.conservative, self._levels(), self.rasteriser
+        return self.divisor, self.conservative, self._levels(), self.rasteriser, str(self)
 
 
 @dataclass(frozen=True)
@@ -85,6 +104,10 @@ class Configuration:
     depth: DepthVariant = DepthVariant()
     guard_px: float | None = None
     """Pixels by which the bounds grow, as in `Device.cull`."""
+    hierarchy: bool | int | None = None
+    """How many tiers of boxes are tested before the instances, as in `CullOptions`."""
+    lod: LodRule | None = None
+    """Which level of detail is drawn, as in `CullOptions`."""
 
     def __str__(self) -> str:
         words = [
@@ -97,6 +120,10 @@ class Configuration:
         words += [self.order] if self.order != "any" else []
         words += [f"guard {self.guard_px:g} px"] if self.guard_px is not None else []
         words += [str(self.depth)] if self.depth != DepthVariant() else []
+        if self.hierarchy is not None:
+            tiers = int(self.hierarchy)
+            words.append({0: "flat", 1: "groups"}.get(tiers, f"{tiers} tiers"))
+        words += [str(self.lod)] if self.lod is not None else []
         return ", ".join(words)
 
     @property
@@ -119,7 +146,10 @@ class Configuration:
             name: getattr(self, name)
             for name in ("footprint", "descent", "fit", "coverage", "order")
         }
-        return options | ({} if self.guard_px is None else {"guard_px": self.guard_px})
+        for name in ("guard_px", "hierarchy", "lod"):
+            # None leaves what the caller's options say.
+            options |= {} if getattr(self, name) is None else {name: getattr(self, name)}
+        return options
 
     def options(self, base: CullOptions) -> CullOptions:
         """`base`, with the fields of this configuration in the place of its own."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias, get_args
 import numpy as np
 
 from .. import _arguments, _core
+from ..camera import Camera
 from ..device import Device
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["SHAPES", "LevelWay", "MethodLevels"]
 
 #: How the levels are made.
-LevelWay: TypeAlias = Literal["fragment", "atomic", "tree"]
+LevelWay: TypeAlias = Literal["fragment", "atomic", "tree", "mips", "pyramid"]
 #: Width and height of the workgroups of atomic minima; each makes a texel of 16x16 pixels.
 SHAPES: Final = ((16, 16), (16, 8), (16, 4), (8, 8), (8, 4), (4, 4))
 
@@ -35,12 +36,16 @@ class MethodLevels:
     ----------
     device : Device
         Where.
-    way : "fragment", "atomic" or "tree"
-        All levels by a fragment pass each, or level 4 alone by one dispatch.
+    way : "fragment", "atomic", "tree", "mips" or "pyramid"
+        - ``"fragment"``: all levels, by a fragment pass each; sides are rounded down
+        - ``"atomic"``, ``"tree"``: level 4 alone, by one dispatch
+        - ``"mips"``, ``"pyramid"``: what hizvk makes, to compare with
     images : sequence of (H, W) float32 arrays
         The depth images.
     shape : (width, height)
         The workgroup of ``"atomic"``, one of `SHAPES`.
+    levels : (first, last)
+        The levels of ``"pyramid"``.
 
     Raises
     ------
@@ -67,6 +72,7 @@ class MethodLevels:
         images: Sequence[npt.NDArray[np.float32]],
         *,
         shape: tuple[int, int] = (16, 16),
+        levels: tuple[int, int] = (1, 15),
     ) -> None:
         _arguments.instance("device", device, Device, "a Device")
         _arguments.choice("way", way, get_args(LevelWay))
@@ -79,7 +85,10 @@ class MethodLevels:
         if not arrays or any(one.shape != arrays[0].shape for one in arrays):
             sizes = [one.shape for one in arrays]
             raise ValueError(f"images: expected at least one, all of one size, got {sizes}")
-        self._inner = _core.MethodLevels(device._engine, way, shape, arrays)
+        # Of no view: it says the size, and that depth is reversed.
+        camera = Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=arrays[0].shape, near=0.1)
+        numbers = levels if way == "pyramid" else shape
+        self._inner = _core.MethodLevels(device._engine, way, numbers, camera._inner, arrays)
 
     def run(self) -> None:
         """Makes the levels of all images, and waits for them."""
@@ -93,7 +102,7 @@ class MethodLevels:
         image : int
             Which of the images.
         k : int
-            4; of ``"fragment"`` any level but 0.
+            4; of ways that make all levels any but 0.
         """
         height, width, texels = self._inner.level(image, k)
         return texels.reshape(height, width)

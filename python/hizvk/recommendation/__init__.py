@@ -5,9 +5,11 @@ So each candidate is checked against what can be seen, and one that hides someth
 recommended.
 Of the others, the one that keeps fewer instances is right more often.
 
-- `entry`: `recommend`: its arguments, and the run from them to the answer
+- `entry`, `arguments`: `recommend` and what it takes
 - `candidate`: one measured configuration, and the choice among several
-- `tried`: which configurations are tried
+- `tried`: which configurations are tried first
+- `axes`: what is tried then, one axis after the other
+- `search`: measures them, checks them and chooses
 - `timing`: times every candidate on every camera, in turns
 - `checking`: what the candidates hide: by rays at the triangles, or by the oracle
 - `blockers`: the rays: float64, at the occluders' triangles

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from .candidate import Candidate
     from .checking import CheckedCandidates
@@ -32,6 +32,11 @@ class Recommendation:
     """How candidates were checked, and how much of what they cull was looked at."""
     notes: tuple[str, ...] = ()
     """Why candidates were dropped, and what is proven of the best."""
+    axes: Mapping[str, tuple[Candidate, ...]] = field(default_factory=dict)
+    """What was tried beyond the first candidates, by axis.
+
+    The first of each is what the axis began with.
+    """
 
     @property
     def front(self) -> tuple[Candidate, ...]:
@@ -53,7 +58,11 @@ class Recommendation:
             lines.append(
                 f"  {mark} {one.ms.median:11.2f}  {share:8.2f} %  "
                 f"{one.hides:8,}  {one.unclear:8,}   {one}"
+                + ("" if one.triangles is None else f", {one.triangles:,} triangles")
             )
+        if self.axes:
+            tried = (f"{name} ({len(rows) - 1})" for name, rows in self.axes.items())
+            lines.append(f"one after the other, from the best so far: {', '.join(tried)}")
         lines += [f"checked by {self.check}"] if self.check else []
         return "\n".join([*lines, *self.notes])
 
@@ -66,9 +75,15 @@ def notes_on(
     coverage: str,
     points: bool,
     rendered: bool,
+    left_out: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """What to know about a recommendation, a sentence or two each."""
     notes = []
+    if left_out:
+        notes.append(
+            f"There was no time for {', '.join(left_out)}: a longer max_seconds has some, "
+            "fewer cameras or repetitions save some."
+        )
     dropped = [one for one in candidates if one.asked and not one.safe]
     if dropped:
         asked = sum(one.asked for one in candidates)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ..camera import Camera
     from ..measuring.configuration import Configuration
     from ..measuring.spread import Spread
+    from ..occluders import OccluderSelection
+    from ..options import MeshLods
     from ..resources import Occluders
     from ..result import CullResult
 
@@ -65,6 +67,12 @@ class Candidate:
     """The given bounds of this kind, for `Device.instances` unless they are `Instances` already."""
     options: CullOptions = field(default=CullOptions(), repr=False)
     """How it culls, for `Device.cull`."""
+    selection: OccluderSelection | None = field(default=None, repr=False, compare=False)
+    """Which of the given meshes are its occluders; None: all of them."""
+    meshes: tuple[MeshLods, ...] | None = field(default=None, repr=False, compare=False)
+    """The meshes for ``meshes=`` of `Device.cull`, if it has a rule for levels of detail."""
+    triangles: int | None = None
+    """Triangles that its lists draw, summed over all cameras; None without levels of detail."""
 
     @property
     def safe(self) -> bool:
@@ -85,7 +93,9 @@ class Candidate:
     def pyramid_options(self) -> dict[str, Any]:
         """Keyword arguments for `Device.pyramid`, beside the image and the kind of its numbers."""
         levels = self.configuration.depth.levels
-        return {} if levels is None else {"levels": levels}
+        options: dict[str, Any] = {} if levels is None else {"levels": levels}
+        depths = self.configuration.depth.depths
+        return options | ({} if depths == "farthest" else {"depths": depths})
 
     def render_options(self, size: Size) -> dict[str, Any]:
         """Keyword arguments for `Device.render_depth` with a camera of `size`."""
@@ -109,7 +119,7 @@ class Candidate:
         camera : Camera
             The view, in the size of the large image.
         occluders : Occluders
-            Of the same device.
+            Of the same device; of a candidate with a `selection`, of the meshes that this keeps.
         depth : DepthImage or (height, width) array
             Instead of `occluders`.
             A candidate that renders depth of its own cannot take it.
@@ -140,20 +150,25 @@ class Candidate:
         else:
             array: Any = depth
             pyramid = device.pyramid(array, camera, **depth_options, **self.pyramid_options)
-        return device.cull(instances, pyramid.camera, pyramid, self.options)
+        return device.cull(instances, pyramid.camera, pyramid, self.options, meshes=self.meshes)
 
     def __str__(self) -> str:
         return str(self.configuration)
 
 
 def choose(
-    candidates: Sequence[Candidate], *, max_ms: float | None = None, kept_within: float = 1.05
+    candidates: Sequence[Candidate],
+    *,
+    max_ms: float | None = None,
+    kept_within: float = 1.05,
+    least: int | None = None,
 ) -> tuple[Candidate, bool]:
     """The candidate to use, and whether it is within the budget.
 
     Only those that are `Candidate.safe` count.
     Of those within `max_ms`, it is the fastest that keeps at most `kept_within` times as many
-    instances as the one that keeps fewest.
+    instances as the one that keeps fewest, or as `least` if that is fewer.
+    If none keeps so few, it is the one that keeps fewest.
     If none is within the budget, it is the fastest of all.
 
     Raises
@@ -169,5 +184,6 @@ def choose(
     able = [one for one in safe if max_ms is None or one.ms.median <= max_ms]
     if not able:
         return min(safe, key=lambda one: one.ms.median), False
-    limit = kept_within * min(one.kept for one in able)
+    fewest = min(one.kept for one in able)
+    limit = max(fewest, kept_within * (fewest if least is None else min(fewest, least)))
     return min((one for one in able if one.kept <= limit), key=lambda one: one.ms.median), True

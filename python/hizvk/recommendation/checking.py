@@ -165,16 +165,25 @@ def hold(
     """
     found = CheckedCandidates(judge.method, [0] * len(chosen), [0] * len(chosen))
     random = np.random.default_rng(0)
-    for volume, bounds in alternatives.items():
+    for volume in alternatives:
         members = [number for number, one in enumerate(chosen) if one.volume == volume]
-        proven = [number for number in members if chosen[number].promises_rays] if every_ray else []
+        if not members:
+            continue
+        # Points beside volumes stand for these, so they may not hide what shows of a volume.
+        judged = _judged(volume, list(alternatives))
+        bounds = alternatives[judged]
+        proven = [
+            number
+            for number, one in enumerate(chosen)
+            if every_ray and one.volume == judged and one.promises_rays
+        ]
         points = bounds._points if isinstance(bounds, Instances) else are_points(bounds)
         for k in range(len(masks[members[0]])):
             culled = {number: ~masks[number][k] for number in members}
             by_some = np.logical_or.reduce(list(culled.values()))
             hidden = np.zeros_like(by_some)
             if proven:
-                hidden = np.logical_or.reduce([culled[number] for number in proven])
+                hidden = np.logical_or.reduce([~masks[number][k] for number in proven])
             visible, open_ = np.zeros_like(by_some), by_some & ~hidden
             if points and not every_ray and any(chosen[number].guard_px for number in members):
                 found.method = GUARD
@@ -200,6 +209,12 @@ def hold(
                 found.unclear[number] += int((open_ & culled[number]).sum()) if every_ray else 0
             steps.step("checking")
     return found
+
+
+def _judged(volume: str, given: Sequence[str]) -> str:
+    """The kind of bounds by which candidates of a kind are checked."""
+    others = [name for name in given if name != "points"]
+    return others[0] if volume == "points" and others else volume
 
 
 def _pick(first: Mask, second: Mask, room: int, random: np.random.Generator) -> Indices:

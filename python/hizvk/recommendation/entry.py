@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+import time
 from typing import TYPE_CHECKING
 
 from .. import _arguments
 from ..bounds import are_points
 from ..device import Device
-from ..measuring.pareto import front
-from ..measuring.spread import spread
 from ..oneline import default_device
 from ..options import cull_options
 from ..progress import Progress, check_progress
 from ..resources import Instances
 from . import checking
 from .answer import Recommendation, notes_on
-from .arguments import alternatives_of, cameras_of, device_of, images_of, occluders_on, upload
-from .candidate import Candidate, choose
-from .timing import DepthSource, number_of_steps, time_all
+from .arguments import (
+    alternatives_of,
+    as_points,
+    cameras_of,
+    device_of,
+    images_of,
+    lods_of,
+    occluders_on,
+    selections_of,
+    upload,
+)
+from .axes import Facts
+from .search import Question, Search
+from .timing import DepthSource
 from .tried import promised
 
 if TYPE_CHECKING:
@@ -30,8 +40,9 @@ if TYPE_CHECKING:
     from .._types import DepthKind
     from ..bounds import Bounds
     from ..camera import Camera
+    from ..lod import LodRule
     from ..mesh import MeshLike
-    from ..options import CullOptions, OptionKeywords
+    from ..options import CullOptions, MeshLods, OptionKeywords
     from ..progress import ProgressLike
     from ..resources import Occluders
 
@@ -52,6 +63,10 @@ def recommend(
     max_ms: float | None = None,
     kept_within: float = 1.05,
     repetitions: int = 5,
+    meshes: Sequence[MeshLods] | None = None,
+    mesh_ids: npt.ArrayLike | None = None,
+    lods: Sequence[LodRule] | None = None,
+    max_seconds: float | None = 120.0,
     progress: ProgressLike = None,
     **keywords: Unpack[OptionKeywords],
 ) -> Recommendation:
@@ -83,7 +98,19 @@ def recommend(
     Those that only a guard of half a pixel keeps count as visible; that guard is a good guess and
     no proof.
 
-    It takes seconds to minutes.
+    Then one axis after the other is tried, each from the best so far:
+
+    ================  =============================================================================
+    points            `Points`, if the bounds are points of another kind
+    rasteriser        the device's and the host's, for plain depth
+    max_triangles     a half, an eighth and a 32nd of the triangles are drawn, for plain depth
+    select_occluders  the meshes that `select_occluders` keeps, also with a quarter of the triangles
+    depths            a pyramid of both ends, so that groups that surely show need no test
+    hierarchy         flat, groups, and two or three tiers, as far as there are so many instances
+    lod               the rules for levels of detail, if there are `meshes`
+    ================  =============================================================================
+
+    It takes seconds to minutes (`max_seconds`).
     Each candidate culls `repetitions` times for each camera, and conservative depth of the full
     size is slow where there are many triangles.
 
@@ -92,6 +119,7 @@ def recommend(
     bounds : Spheres, Boxes, OrientedBoxes, Points or Instances; or a sequence of them
         The N instances.
         Several kinds of bounds of the same instances are compared with one another.
+        `Points` beside others stand for these, so they may not hide what shows of them.
         The host knows no numbers of `Instances`, so no rays are cast at them: what conservative
         depth does not hide stays unclear.
     cameras : Camera or sequence of Camera
@@ -125,6 +153,17 @@ def recommend(
         the candidate that keeps least.
     repetitions : int
         How often each is timed, beside the first call.
+    meshes : sequence of MeshLods, optional
+        The meshes that are drawn, with their levels of detail.
+    mesh_ids : (N,) integer array, optional
+        The mesh of each instance, as in `Device.instances`; of `Instances`, their own.
+    lods : sequence of LodByError, LodByDistance or LodBySize; optional
+        The rules that you would draw by.
+        Of these, the one whose lists draw the fewest triangles is recommended.
+        None: an error of one pixel if `meshes` have errors, else halves of the size.
+    max_seconds : float, optional
+        After so long no further repetition and no further axis begins; None: no limit.
+        The first candidates are always measured once.
     progress : bool or function, optional
         As everywhere (`hizvk.progress`); a step is a cull, a depth image or a check.
     **keywords
@@ -170,6 +209,10 @@ def recommend(
     kept_within = _arguments.number("kept_within", kept_within, at_least=1.0)
     repetitions = _arguments.integer("repetitions", repetitions, low=1, high=10_000)
     check_progress(progress)
+    until = math.inf
+    if max_seconds is not None:
+        until = time.monotonic() + _arguments.number("max_seconds", max_seconds, at_least=0.0)
+    levels, rules = lods_of(meshes, lods)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
     images = None if depths is None else images_of(depths, views, kind, scale, invalid)
@@ -181,53 +224,57 @@ def recommend(
         raise ValueError(f"scale: expected 1 beside occluders, got {scale:g}")
     device = device or device_of(occluders, alternatives) or default_device()
     walls = None if occluders is None else occluders_on(device, occluders)
-    volumes = {name: upload(one, device) for name, one in alternatives.items()}
+    volumes = {name: upload(one, device, mesh_ids) for name, one in alternatives.items()}
     points = any(
         one._points if isinstance(one, Instances) else are_points(one)
         for one in alternatives.values()
     )
 
-    chosen = promised(tuple(volumes), coverage, rendered=walls is not None, points=points)
+    first = promised(tuple(volumes), coverage, rendered=walls is not None, points=points)
     source = DepthSource(device, walls, views, images)
     every_ray = walls is not None and coverage == "area"
     if walls is not None and every_ray:
         judge = checking.by_rays(walls, views)
     else:
         judge = checking.by_oracle(source.full_image, views, coverage)
-    total = number_of_steps(chosen, views, repetitions) + len(alternatives) * len(views)
-    with Progress(progress, "trying candidates", total) as steps:
-        times = time_all(chosen, volumes, source, repetitions, options, steps)
-        check = checking.hold(
-            chosen, times.masks, alternatives, judge, every_ray=every_ray, steps=steps
-        )
-    kept = [sum(int(mask.sum()) for mask in masks) for masks in times.masks]
-    candidates = [
-        Candidate(
-            one,
-            ms=times.total(k),
-            cull_ms=spread(times.cull[k]),
-            kept=kept[k],
-            on_front=False,
-            hides=check.hides[k],
-            unclear=check.unclear[k],
-            proven=one.promises_rays or not every_ray,
-            asked=coverage == "sample" or one.coverage == "area",
-            bounds=alternatives[one.volume],
-            options=one.options(options),
-        )
-        for k, one in enumerate(chosen)
-    ]
-    best = front([one.ms.median for one in candidates], kept, [one.safe for one in candidates])
-    candidates = [replace(one, on_front=bool(on)) for one, on in zip(candidates, best, strict=True)]
-    candidates.sort(key=lambda one: one.ms.median)
-    picked, within = choose(candidates, max_ms=max_ms, kept_within=kept_within)
+    bare = as_points(alternatives)
+    if bare is not None:
+        alternatives["points"] = bare
+        volumes["points"] = upload(bare, device, mesh_ids)
+    triangles = None if walls is None else walls.num_triangles
+    selections = selections_of(occluders, triangles or 0)
+    source.selections = {budget: device.occluders(some) for budget, (_, some) in selections.items()}
+    count = len(next(iter(volumes.values())))
+    facts = Facts(count, triangles, tuple(selections), bare is not None, rules)
+    question = Question(
+        alternatives=alternatives,
+        volumes=volumes,
+        source=source,
+        judge=judge,
+        every_ray=every_ray,
+        coverage=coverage,
+        options=options,
+        repetitions=repetitions,
+        max_ms=max_ms,
+        kept_within=kept_within,
+        meshes=levels,
+        selections={budget: selection for budget, (selection, _) in selections.items()},
+        until=until,
+    )
+    with Progress(progress, "trying candidates") as steps:
+        search = Search(question, steps)
+        steps.total = search.planned(first, facts)
+        candidates, picked, within, check = search.run(first, facts)
+        # What was left out for want of time counts as done.
+        steps.step(count=max(0, steps.total - steps.done))
     return Recommendation(
         best=picked,
         within_budget=within,
         candidates=tuple(candidates),
-        tested=len(next(iter(volumes.values()))) * len(views),
+        tested=count * len(views),
         adapter=str(device.adapter),
         check=check.words(),
+        axes=search.axes(candidates),
         notes=notes_on(
             candidates,
             picked,
@@ -235,5 +282,6 @@ def recommend(
             coverage=coverage,
             points=points,
             rendered=walls is not None,
+            left_out=search.left_out,
         ),
     )

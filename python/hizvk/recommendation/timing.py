@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -11,7 +13,7 @@ from .. import _arguments
 from ..depth import DepthArray
 from ..measuring.configuration import DepthVariant
 from ..measuring.spread import spread
-from ..measuring.stopwatch import Stopwatch, cull
+from ..measuring.stopwatch import Stopwatch, cull, drawn_triangles
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from ..device import Device
     from ..measuring.configuration import Configuration
     from ..measuring.spread import Spread
-    from ..options import CullOptions
+    from ..options import CullOptions, MeshLods
     from ..progress import Progress
     from ..resources import DepthImage, Instances, Occluders, Pyramid
 
@@ -56,8 +58,10 @@ class DepthSource:
     ) -> None:
         self.device, self.views = device, views
         self._walls, self._images = walls, images
-        self._turn: dict[tuple[int, bool], tuple[DepthImage, float]] = {}
-        self._slow: dict[tuple[int, bool, int], tuple[DepthImage, float]] = {}
+        self.selections: dict[int, Occluders] = {}
+        """The occluders of `DepthVariant.selected`."""
+        self._turn: dict[DepthVariant, tuple[DepthImage, float]] = {}
+        self._slow: dict[tuple[DepthVariant, int], tuple[DepthImage, float]] = {}
 
     def pyramids(
         self, variants: Sequence[DepthVariant], k: int
@@ -78,26 +82,31 @@ class DepthSource:
         if self._images is not None:
             watch = Stopwatch(self.device)
             stored = _arguments.stored_levels("levels", variant.levels)
-            pyramid = self.device._pyramid_of(self._images[k], self.views[k], stored)
+            image, view = self._images[k], self.views[k]
+            pyramid = self.device._pyramid_of(image, view, stored, depths=variant.depths)
             return pyramid, watch.lap()
         depth, took = self._depth(variant, k)
         watch = Stopwatch(self.device)
-        return self.device.pyramid(depth, levels=variant.levels), took + watch.lap()
+        pyramid = self.device.pyramid(depth, levels=variant.levels, depths=variant.depths)
+        return pyramid, took + watch.lap()
 
     def _depth(self, variant: DepthVariant, k: int) -> tuple[DepthImage, float]:
         """The image, rendered once a turn; only once in all if that is slow."""
         assert self._walls is not None
-        key = variant.divisor, variant.conservative
-        if key not in self._turn and (*key, k) in self._slow:
-            self._turn[key] = self._slow[*key, k]
+        key = variant.image()
+        if key not in self._turn and (key, k) in self._slow:
+            self._turn[key] = self._slow[key, k]
         if key not in self._turn:
+            walls = self._walls
+            if variant.selected is not None:
+                walls = self.selections[variant.selected]
             watch = Stopwatch(self.device)
             camera = self.views[k]
             options = variant.render_options(camera.size)
-            depth = self.device.render_depth(self._walls, camera, **options)
+            depth = self.device.render_depth(walls, camera, **options)
             self._turn[key] = depth, watch.lap()
             if self._turn[key][1] > SLOW_MS:
-                self._slow[*key, k] = self._turn[key]
+                self._slow[key, k] = self._turn[key]
         return self._turn[key]
 
 
@@ -114,6 +123,8 @@ class Times:
     """``(candidates, repetitions, views)``: the mask to the host."""
     masks: list[list[npt.NDArray[np.bool_]]]
     """By candidate and view."""
+    triangles: list[int | None]
+    """By candidate: what it draws in all views, if it has a rule for levels of detail."""
 
     def total(self, k: int) -> Spread:
         """The whole way of one candidate; the quartiles are those of cull and read."""
@@ -136,17 +147,24 @@ def time_all(
     repetitions: int,
     base: CullOptions,
     steps: Progress,
+    meshes: Sequence[MeshLods] | None = None,
+    until: float = math.inf,
 ) -> Times:
     """Times every candidate `repetitions` times on every view.
 
     One more repetition comes first: it compiles, gives the masks, and is not counted.
+    At least one more follows; others end at `until`, a time of `time.monotonic`.
     """
     rounds, views = repetitions + 1, len(source.views)
     variants = sorted({one.depth for one in chosen}, key=DepthVariant.cost)
     depth_ms = {variant: np.zeros((rounds, views)) for variant in variants}
     culling, reading = np.zeros((2, len(chosen), rounds, views))
     masks: list[list[npt.NDArray[np.bool_]]] = [[] for _ in chosen]
+    triangles: list[int | None] = [None] * len(chosen)
     for repetition in range(rounds):
+        if repetition > 1 and time.monotonic() > until:
+            rounds = repetition
+            break
         for k in range(views):
             made = source.pyramids(variants, k)
             for variant, (_, took) in made.items():
@@ -155,12 +173,19 @@ def time_all(
             for turn in range(len(chosen)):
                 number = (turn + repetition * len(chosen) // rounds + k) % len(chosen)
                 one = chosen[number]
-                mask, *both = cull(
-                    source.device, volumes[one.volume], made[one.depth][0], one, base
-                )
+                instances, pyramid = volumes[one.volume], made[one.depth][0]
+                if one.lod is None:
+                    mask, *both = cull(source.device, instances, pyramid, one, base)
+                else:
+                    assert meshes is not None
+                    mask, *both, drawn = drawn_triangles(
+                        source.device, instances, pyramid, one.options(base), meshes
+                    )
+                    if repetition == 0:
+                        triangles[number] = (triangles[number] or 0) + drawn
                 culling[number, repetition, k], reading[number, repetition, k] = both
                 if repetition == 0:
                     masks[number].append(mask)
                 steps.step("timing")
-    counted = {variant: ms[1:] for variant, ms in depth_ms.items()}
-    return Times(chosen, counted, culling[:, 1:], reading[:, 1:], masks)
+    counted = {variant: ms[1:rounds] for variant, ms in depth_ms.items()}
+    return Times(chosen, counted, culling[:, 1:rounds], reading[:, 1:rounds], masks, triangles)

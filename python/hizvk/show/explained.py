@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from ..view_depth import RayView, converted
-from .colours import CLASS_COLOURS, FRUSTUM, MARK, rgb, scale_of
+from .colours import CLASS_COLOURS, MARK, rgb, scale_of
 from .html import document, number
 from .lines import draw
 from .png import png
@@ -28,6 +28,8 @@ LEAST_AROUND: Final = 6
 SIDE: Final = 420
 #: Outlines of texels in pictures of dark and of light depth.
 TEXEL: Final = "#14181c"
+#: The outline of the rectangle, between dark lines.
+BOUNDS: Final = "#ffffff"
 #: More texels than this get no number in a figure.
 MOST_LABELS: Final = 40
 #: How many texels the second panel of a figure shows: the farthest ones and the decisive one.
@@ -104,7 +106,7 @@ class Explained(NamedTuple):
         )  # fmt: skip
 
     def picture(self) -> bytes:
-        """A PNG of the depth around the rectangle (yellow), with the texels that were read."""
+        """A PNG of the depth around the rectangle (white), with the texels that were read."""
         x0, y0, x1, y1 = self._window()
         depth = self._metric(self.depth)
         shown = scale_of(depth).colours(depth[y0:y1, x0:x1])
@@ -119,12 +121,13 @@ class Explained(NamedTuple):
             _frame(image, self._pixels(self.texels[self.decisive]), (x0, y0), scale, MARK)
         if self.rectangle is not None:
             a, b, c, d = self.rectangle
-            _frame(image, (a, b, c + 1, d + 1), (x0, y0), scale, FRUSTUM)
+            _frame(image, (a, b, c + 1, d + 1), (x0, y0), scale, TEXEL)
+            _frame(image, (a, b, c + 1, d + 1), (x0, y0), scale, BOUNDS, inwards=1)
         return png(np.ascontiguousarray(image))
 
     def html(self) -> str:
         """The picture above the text."""
-        notes = ["yellow: pixels that the bounds can meet; dark: texels that were read"]
+        notes = ["white: pixels that the bounds can meet; dark: texels that were read"]
         if self.decisive is not None:
             notes[0] += "; pink: the texel that decided"
         return document(
@@ -147,6 +150,7 @@ class Explained(NamedTuple):
     def _place(self, sheet: Any, axis: Any) -> None:
         from matplotlib.lines import Line2D
         from matplotlib.patches import Rectangle
+        from matplotlib.patheffects import withStroke
 
         from .levels import colour_bar
 
@@ -172,7 +176,7 @@ class Explained(NamedTuple):
                 text = number(float(depths[place])) if np.isfinite(depths[place]) else "far"
                 axis.text(
                     (a + c) / 2, (b + d) / 2, text, ha="center", va="center", size=8, bbox=box,
-                    zorder=5, clip_on=True,
+                    zorder=7, clip_on=True,
                 )  # fmt: skip
         if self.decisive is not None:
             edges.append(Line2D([], [], color=MARK, linewidth=2.4, label="the one that decided"))
@@ -188,13 +192,13 @@ class Explained(NamedTuple):
             )  # fmt: skip
             axis.add_patch(
                 Rectangle(
-                    (a, b), c + 1 - a, d + 1 - b, fill=False, edgecolor=FRUSTUM, linewidth=1.8,
+                    (a, b), c + 1 - a, d + 1 - b, fill=False, edgecolor=BOUNDS, linewidth=1.8,
                     zorder=6,
                 )
             )  # fmt: skip
-            edges.insert(
-                0, Line2D([], [], color=FRUSTUM, linewidth=2.4, label="pixels of the bounds")
-            )
+            dark = [withStroke(linewidth=4.0, foreground="black")]
+            named: dict[str, Any] = {"color": BOUNDS, "linewidth": 2.0, "path_effects": dark}
+            edges.insert(0, Line2D([], [], label="pixels of the bounds", **named))
             axis.legend(
                 handles=edges, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3,
                 fontsize=8, frameon=False,
@@ -205,6 +209,7 @@ class Explained(NamedTuple):
         axis.set_xlabel("column (pixels)", size=9)
         axis.set_ylabel("row (pixels)", size=9)
         axis.tick_params(labelsize=8)
+        axis.locator_params(integer=True, nbins=7)
         colour_bar(sheet, axis, scale, self._label)
 
     def _compare(self, axis: Any) -> None:
@@ -282,11 +287,11 @@ def _frame(
     origin: tuple[int, int],
     scale: float,
     colour: str,
+    inwards: int = 0,
 ) -> None:
-    """Draws the outline of a box of pixels just within it."""
-    x0, y0, x1, y1 = (
-        scale * (one - origin[axis % 2]) for axis, one in enumerate(box)
-    )  # fmt: skip
-    x1, y1 = max(x1 - 1.0, x0), max(y1 - 1.0, y0)
+    """Draws the outline of a box of pixels within it, or so many pixels farther inwards."""
+    x0, y0, x1, y1 = (scale * (one - origin[axis % 2]) for axis, one in enumerate(box))
+    x0, y0 = x0 + inwards, y0 + inwards
+    x1, y1 = max(x1 - 1.0 - inwards, x0), max(y1 - 1.0 - inwards, y0)
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
     draw(image, np.stack([corners[:-1], corners[1:]], axis=1), rgb(colour))

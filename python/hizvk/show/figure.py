@@ -27,9 +27,6 @@ def figure(width: float, height: float) -> Any:
             name="matplotlib",
         )
     made = sheet(width, height)
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(made)
     # IPython shows what has this method, also before pyplot has told it about figures.
     made._repr_png_ = lambda: _file(made)
     return made

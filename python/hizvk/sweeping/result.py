@@ -148,8 +148,8 @@ class Sweep:
 
         Returns
         -------
-        (indptr, indices)
-            ``(V + 1,)`` int64 and ``(count,)`` int32.
+        two integer arrays
+            ``indptr``, ``(V + 1,)`` int64, and ``indices``, ``(count,)`` int32.
             View v keeps the instances ``indices[indptr[v]:indptr[v + 1]]``, in ascending order.
 
         Raises

@@ -116,11 +116,10 @@ def viewshed(
         keywords = {"descent": 4096, "fit": "volume"}
 
     there = np.isfinite(grid)
-    boxes, low, high = _boxes(grid, there, steps, target_height)
-    # What is nearer than this along all axes is in no view, so it counts as seen.
+    # What is nearer than this along all axes is in no view; no cell is so small.
     near = min(eye_height, *steps) / 16.0
     seen = sweep(
-        boxes,
+        _boxes(grid, there, steps, target_height),
         cube(place, size=size, near=near),
         occluders=_mesh(grid, steps),
         conservative=conservative,
@@ -131,7 +130,6 @@ def viewshed(
         options=options,
         **keywords,
     ).union()
-    seen |= ((low <= place + near) & (high >= place - near)).all(axis=1)
     result = np.zeros(grid.shape, np.bool_)
     result[there] = seen
     return result
@@ -191,8 +189,8 @@ def _mesh(grid: _Floats, steps: tuple[float, float]) -> Mesh:
 
 def _boxes(
     grid: _Floats, there: npt.NDArray[np.bool_], steps: tuple[float, float], target_height: float
-) -> tuple[OrientedBoxes, _Floats, _Floats]:
-    """A sheared box around the triangles of each cell, and the corners of upright boxes around it.
+) -> OrientedBoxes:
+    """A sheared box around the triangles of each cell.
 
     A cell is cut by the lines through its height and by one diagonal.
     So its triangles lie between planes wherever the middle, the four middles of sides and the four
@@ -239,5 +237,4 @@ def _boxes(
     axes = np.zeros((len(row), 3, 3))
     axes[:] = np.eye(3)
     axes[:, 2, 0], axes[:, 2, 1] = by_column, by_row
-    reach = (np.abs(axes) * half[:, None, :]).sum(axis=2)
-    return OrientedBoxes(centers, half, axes), centers - reach, centers + reach
+    return OrientedBoxes(centers, half, axes)

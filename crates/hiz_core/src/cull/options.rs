@@ -40,6 +40,10 @@ impl Coverage {
 /// A larger footprint uses a finer level, so a cull keeps less and reads more.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Footprint {
+    /// The one texel that encloses the rectangle.
+    /// It is coarse where a border of large texels crosses the rectangle, so most is kept.
+    /// With a descent this is the test of Greene, Kass and Miller (1993).
+    One,
     /// 2 x 2.
     #[default]
     Two,
@@ -52,6 +56,7 @@ pub enum Footprint {
 impl Footprint {
     pub(super) fn log2(self) -> u32 {
         match self {
+            Self::One => 0,
             Self::Two => 1,
             Self::Four => 2,
             Self::Eight => 3,

@@ -14,8 +14,12 @@ use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
 use crate::headless::Engine;
 use crate::headless::readback::{self, BufferRange};
+use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::methods::fragment_levels::FragmentLevels;
+use crate::pyramid::levels::StoredLevels;
+use crate::pyramid::mips::{MipOptions, MipTexture};
+use crate::pyramid::{Pyramid, PyramidOptions};
 
 /// Pixels along a side of a texel of level 4; `shaders/methods/coarse_level.wgsl`, `TILE`.
 pub(crate) const TILE: u32 = 16;
@@ -34,6 +38,10 @@ pub enum LevelWay {
     Atomic(u32, u32),
     /// Level 4 alone, by halving in shared memory.
     Tree,
+    /// The library's own reduction, to these levels.
+    Pyramid(StoredLevels),
+    /// The library's mip texture: every level, by compute passes.
+    Mips,
 }
 
 /// The shapes of workgroups of [`LevelWay::Atomic`]; each makes a texel of 16x16 pixels.
@@ -65,26 +73,34 @@ impl LevelWay {
 enum Work {
     Fragment(FragmentLevels),
     Coarse { pipeline: wgpu::ComputePipeline, bindings: wgpu::BindGroup, level: wgpu::Buffer },
+    Pyramid { source: wgpu::TextureView, pyramid: Pyramid },
+    Mips { source: wgpu::TextureView, mips: MipTexture },
 }
 
 /// The levels of some images of one size, with everything made beforehand.
 #[derive(Debug)]
 pub struct MethodLevels {
     engine: Engine,
+    /// Of no view: it says the size, and that depth is reversed.
+    camera: Camera,
     size: ImageSize,
     work: Vec<Work>,
 }
 
 impl MethodLevels {
-    /// Prepares the levels of `images`, each with the rows of an image of `size`.
+    /// Prepares the levels of `images`, each with the rows of an image of the camera's size.
     ///
     /// The numbers are taken as they are, in reversed Z: the least is the farthest.
     ///
     /// # Errors
-    /// - [`Error::Invalid`] for an image of another size, or for an unknown workgroup.
+    /// - [`Error::Invalid`] for a camera without reversed Z, an image of another size, or an
+    ///   unknown workgroup.
     /// - [`Error::Limit`] and [`Error::Device`] if the device has no room.
-    pub fn new(engine: &Engine, way: LevelWay, size: ImageSize, images: &[&[f32]]) -> Result<Self> {
-        let gpu = &*engine.context().gpu;
+    pub fn new(engine: &Engine, way: LevelWay, camera: &Camera, images: &[&[f32]]) -> Result<Self> {
+        let (gpu, size) = (&*engine.context().gpu, camera.size());
+        if !camera.convention().is_reversed() {
+            return Err(Error::invalid("camera", "expected one with reversed depth"));
+        }
         let work = images
             .iter()
             .map(|image| {
@@ -93,11 +109,21 @@ impl MethodLevels {
                     LevelWay::FragmentPasses => {
                         FragmentLevels::new(gpu, &texture, size).map(Work::Fragment)
                     }
+                    LevelWay::Pyramid(levels) => {
+                        let options = PyramidOptions { levels, ..PyramidOptions::default() };
+                        let pyramid = engine.context().create_pyramid(size, &options)?;
+                        Ok(Work::Pyramid { source: gpu.view(&texture)?, pyramid })
+                    }
+                    LevelWay::Mips => {
+                        let mips =
+                            engine.context().create_mip_texture(size, &MipOptions::default())?;
+                        Ok(Work::Mips { source: gpu.view(&texture)?, mips })
+                    }
                     _ => coarse(gpu, way.entry_point()?, &texture, size),
                 }
             })
             .collect::<Result<_>>()?;
-        Ok(Self { engine: engine.clone(), size, work })
+        Ok(Self { engine: engine.clone(), camera: camera.clone(), size, work })
     }
 
     /// Makes the levels of all images in one submission and waits for it.
@@ -113,6 +139,18 @@ impl MethodLevels {
         for work in &self.work {
             match work {
                 Work::Fragment(levels) => levels.record(&mut encoder),
+                Work::Pyramid { source, pyramid } => {
+                    self.engine.context().record_reduce(
+                        &mut encoder,
+                        source,
+                        &self.camera,
+                        pyramid,
+                    )?;
+                }
+                Work::Mips { source, mips } => {
+                    let convention = self.camera.convention();
+                    self.engine.context().record_mips(&mut encoder, source, convention, mips)?;
+                }
                 Work::Coarse { pipeline, bindings, .. } => {
                     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                         label: Some("hiz.methods.coarse_level"),
@@ -143,6 +181,16 @@ impl MethodLevels {
                 return levels
                     .read(&self.engine, k)?
                     .ok_or_else(|| missing(format!("1 to {}", levels.last())));
+            }
+            Work::Pyramid { pyramid, .. } => {
+                let [width, height] =
+                    [self.size.width, self.size.height].map(|side| side.div_ceil(1 << k.min(31)));
+                let texels = self.engine.read_level(pyramid, k)?;
+                return Ok((ImageSize::new(width, height), texels));
+            }
+            Work::Mips { mips, .. } => {
+                let size = mips.level_size(k).ok_or_else(|| missing("a level".into()))?;
+                return Ok((size, self.engine.read_mip(mips, k)?));
             }
             Work::Coarse { .. } if k != TILE.ilog2() => return Err(missing("4".into())),
             Work::Coarse { level, .. } => level,

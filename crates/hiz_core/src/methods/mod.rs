@@ -12,11 +12,15 @@ mod seen;
 mod texts;
 pub mod tiling;
 
+#[cfg(test)]
+pub(crate) use coarse_level::TILE;
+#[cfg(feature = "testing")]
+pub(crate) use coarse_level::coarse_level_module;
 pub use coarse_level::{LevelWay, MethodLevels, SHAPES};
 #[cfg(feature = "testing")]
-pub(crate) use coarse_level::{TILE, coarse_level_module};
-#[cfg(feature = "testing")]
 pub(crate) use fragment_levels::fragment_levels_module;
-pub use texts::{Text, TextCamera, TextCull};
 #[cfg(feature = "testing")]
-pub(crate) use texts::{TextUniform, WORKGROUP as TEXT_WORKGROUP, texts_module};
+pub(crate) use texts::texts_module;
+pub use texts::{Text, TextCamera, TextCull};
+#[cfg(test)]
+pub(crate) use texts::{TextUniform, WORKGROUP as TEXT_WORKGROUP};

@@ -105,7 +105,9 @@ impl Tree {
             }
         }
         let mut tree = Self { nodes: Vec::new(), items: Vec::new() };
-        if let Some(all) = placed.iter().map(|p| p.bounds).reduce(|a, b| a.and(&b)) {
+        if !placed.is_empty() {
+            let mut all = WorldBox::NOTHING;
+            placed.iter().for_each(|p| all.include(&p.bounds));
             let WorldBox { min, max, .. } = all;
             let side = (0..3).map(|k| max[k] - min[k]).fold(0.0, f64::max);
             let cell = Cell { middle: std::array::from_fn(|k| 0.5 * min[k] + 0.5 * max[k]), side };
@@ -161,16 +163,12 @@ impl Tree {
                 child += 1;
             }
         }
-        let own = &placed[..ends[OWN]];
-        let boxes_of_children = self.nodes[begin..begin + children.len()].iter();
-        let known = if is_planted!(splitting.fault, ParentMissesChild) && children.len() > 1 {
-            children.len() - 1
-        } else {
-            children.len()
-        };
-        let boxes = own.iter().map(|p| p.bounds);
-        let boxes = boxes.chain(boxes_of_children.take(known).map(|node| node.bounds));
-        let bounds = boxes.reduce(|a, b| a.and(&b)).unwrap_or(self.nodes[index].bounds);
+        let mut bounds = WorldBox::NOTHING;
+        placed[..ends[OWN]].iter().for_each(|p| bounds.include(&p.bounds));
+        let missed =
+            usize::from(is_planted!(splitting.fault, ParentMissesChild) && children.len() > 1);
+        let known = &self.nodes[begin..begin + children.len() - missed];
+        known.iter().for_each(|node| bounds.include(&node.bounds));
         let node = &mut self.nodes[index];
         node.bounds = bounds;
         node.own = first..first + ends[OWN] as u32;
@@ -190,8 +188,7 @@ struct Splitting {
 
 impl Node {
     fn unfinished(parent: u32, level: u8) -> Self {
-        let bounds =
-            WorldBox { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3], stretch: 0.0 };
+        let bounds = WorldBox::NOTHING;
         Self { bounds, own: 0..0, all: 0..0, children: 0..0, parent, level, triangles: 0 }
     }
 }

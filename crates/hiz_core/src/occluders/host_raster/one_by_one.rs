@@ -55,13 +55,19 @@ impl WorldBox {
         Self { min: low, max: high, stretch: stretch(&linear) }
     }
 
-    /// The smallest box around both.
-    pub(crate) fn and(&self, other: &Self) -> Self {
-        Self {
-            min: std::array::from_fn(|k| self.min[k].min(other.min[k])),
-            max: std::array::from_fn(|k| self.max[k].max(other.max[k])),
-            stretch: self.stretch.max(other.stretch),
+    /// The box around nothing.
+    pub(crate) const NOTHING: Self =
+        Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3], stretch: 0.0 };
+
+    /// Grows to hold another box, too.
+    ///
+    /// In place: LLVM 22 crashes on a fold of boxes that are returned.
+    pub(crate) fn include(&mut self, other: &Self) {
+        for k in 0..3 {
+            self.min[k] = self.min[k].min(other.min[k]);
+            self.max[k] = self.max[k].max(other.max[k]);
         }
+        self.stretch = self.stretch.max(other.stretch);
     }
 }
 

@@ -184,6 +184,7 @@ impl Mirror {
             reversed: round.view.reversed,
             sample_coverage: coverage == hiz_core::Coverage::Sample,
             footprint_log2: match footprint {
+                Footprint::One => 0,
                 Footprint::Two => 1,
                 Footprint::Four => 2,
                 Footprint::Eight => 3,
@@ -307,11 +308,8 @@ impl Mirror {
         // 4. The finest level at which the rectangle spans no more texels than the footprint.
         let (first, last) = (first.map(|v| v as u32), last.map(|v| v as u32));
         let n = self.footprint_log2;
-        let extent = (last[0] - first[0]) | (last[1] - first[1]) | 1;
-        let mut level = extent.ilog2().max(n - 1) - (n - 1);
-        if (0..2).any(|k| (last[k] >> level) - (first[k] >> level) >= 1 << n) {
-            level += 1;
-        }
+        let spans = |level: u32| (0..2).map(move |k| (last[k] >> level) - (first[k] >> level));
+        let level = (0..32).find(|level| spans(*level).all(|more| more < 1 << n)).expect("one");
         let (from, to) = (first.map(|v| v >> level), last.map(|v| v >> level));
 
         // 5. All of the volume is farther than the farthest depth in the footprint.
