@@ -1327,9 +1327,9 @@ TABLES: dict[str, Table] = {
             "occluders": [(TETRAHEDRON, TypeError, "expected Occluders of Device.occluders")],
             "leaf": [(0, ValueError, "got int 0"), (0.5, TypeError, "got float 0.5")],
             "most_parts": [
-                (0.5, ValueError, "got 0.5"),
+                (0.5, ValueError, "got float 0.5"),
                 ("all", TypeError, "got str 'all'"),
-                (NAN, ValueError, "got nan"),
+                (NAN, ValueError, "got float nan"),
             ],
         },
     ),
