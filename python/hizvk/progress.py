@@ -111,6 +111,8 @@ class Progress:
     def step(self, doing: str = "", count: int = 1) -> None:
         """Counts steps as done; `doing` is the next one."""
         self.done += count
+        if self.total is not None:
+            self.total = max(self.total, self.done)  # it may have been an estimate
         self.doing = doing
         if self._call is not None:
             self._call(self.done, self.total)
@@ -283,6 +285,7 @@ class _Notebook:
         self._renew(of.bar())
 
     def end(self, of: Progress) -> None:
+        of.doing = ""
         self._renew(of.text())
 
     def _renew(self, line: str) -> None:
