@@ -296,12 +296,13 @@ class _Notebook:
             self._handle.update(shown, raw=True)
 
 
-def check_progress(progress: object) -> Callable[[int, int | None], object] | None:
+def check_progress(progress: Any) -> Callable[[int, int | None], object] | None:
     """The caller's function; None for True, False and None; a `TypeError` for anything else."""
     if progress is None or isinstance(progress, (bool, np.bool_)):
         return None
     if callable(progress):
-        return progress
+        call: Callable[[int, int | None], object] = progress
+        return call
     from . import _arguments
 
     got = _arguments.describe(progress)
