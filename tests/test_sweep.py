@@ -376,6 +376,15 @@ def test_what_was_swept_otherwise_is_no_beginning(tmp_path: Path) -> None:
             call(5000)
 
 
+def test_what_is_uploaded_already_is_refused_with_the_way_out() -> None:
+    device = hizvk.Device()
+    walls: Any = device.occluders(WALLS)
+    crowd: Any = device.instances(BALLS)
+    for bounds, occluders, name in ((crowd, WALLS, "bounds"), (BALLS, walls, "occluders")):
+        with pytest.raises(TypeError, match=f"{name}: .*pass what was uploaded"):
+            hizvk.sweep(bounds, CAMERAS, occluders=occluders)
+
+
 @pytest.mark.parametrize("executor", [None, 1])
 def test_a_bad_array_of_one_view_is_named(executor: int | None) -> None:
     if executor is not None:
