@@ -381,7 +381,7 @@ def test_what_is_uploaded_already_is_refused_with_the_way_out() -> None:
     walls: Any = device.occluders(WALLS)
     crowd: Any = device.instances(BALLS)
     for bounds, occluders, name in ((crowd, WALLS, "bounds"), (BALLS, walls, "occluders")):
-        with pytest.raises(TypeError, match=f"{name}: .*pass what was uploaded"):
+        with pytest.raises(TypeError, match=f"{name}: .*pass them as they were before the upload"):
             hizvk.sweep(bounds, CAMERAS, occluders=occluders)
 
 

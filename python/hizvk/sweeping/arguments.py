@@ -45,7 +45,7 @@ def refuse_uploaded(bounds: object, occluders: object) -> None:
         if isinstance(value, kind):
             raise TypeError(
                 f"{name}: expected {instead}, got {_arguments.describe(value)}; each worker "
-                "uploads them to a device of its own, so pass what was uploaded"
+                "uploads them to a device of its own, so pass them as they were before the upload"
             )
 
 
