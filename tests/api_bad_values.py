@@ -1719,7 +1719,11 @@ TABLES: dict[str, Table] = {
                 (None, TypeError, "got None"),
             ],
             "occluders": [
-                ("wall", TypeError, "expected a Mesh, a mesh of trimesh or Open3D"),
+                (
+                    "wall",
+                    TypeError,
+                    "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a list",
+                ),
                 ([TETRAHEDRON, 3], TypeError, "got int 3"),
             ],
             "title": [(3, TypeError, "expected a text, got int 3")],
