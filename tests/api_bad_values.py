@@ -5,6 +5,7 @@ a part of its text.
 """
 
 import os
+import atexit
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -2086,6 +2087,7 @@ def swept() -> hizvk.Sweep:
 
 #: It is removed when the interpreter ends.
 FOLDER = tempfile.TemporaryDirectory()
+atexit.register(FOLDER.cleanup)
 FACES: list[Bad] = [
     ("sides", ValueError, 'expected one of "none", "back", "front", got str'),
     (None, TypeError, "got None"),
