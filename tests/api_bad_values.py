@@ -4,8 +4,8 @@ Each function has a table: valid arguments, and for each parameter bad values wi
 a part of its text.
 """
 
-import os
 import atexit
+import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
