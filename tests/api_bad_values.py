@@ -4,6 +4,7 @@ Each function has a table: valid arguments, and for each parameter bad values wi
 a part of its text.
 """
 
+import atexit
 import os
 import tempfile
 from collections.abc import Callable
@@ -2084,6 +2085,9 @@ def swept() -> hizvk.Sweep:
     return hizvk.sweep(spheres(), [camera()], depths=[depth], kind="z")
 
 
+#: It is removed when the interpreter ends.
+FOLDER = tempfile.TemporaryDirectory()
+atexit.register(FOLDER.cleanup)
 FACES: list[Bad] = [
     ("sides", ValueError, 'expected one of "none", "back", "front", got str'),
     (None, TypeError, "got None"),
@@ -2191,7 +2195,7 @@ TABLES |= {
     "Sweep.union": Table(lambda _: (swept().union, {}), {}),
     "Sweep.csr": Table(lambda _: (swept().csr, {}), {"scipy": FLAG}),
     "Sweep.save": Table(
-        lambda _: (swept().save, {"path": Path(tempfile.gettempdir()) / "hizvk-test.npz"}),
+        lambda _: (swept().save, {"path": Path(FOLDER.name) / "sweep.npz"}),
         {"path": [(3, TypeError, "expected a path, got int 3"), (None, TypeError, "got None")]},
     ),
     "Sweep.load": Table(
@@ -2291,7 +2295,7 @@ TABLES |= {
 
 
 def saved_sweep() -> str:
-    path = Path(tempfile.gettempdir()) / "hizvk-test.npz"
+    path = Path(FOLDER.name) / "sweep.npz"
     swept().save(path)
     return str(path)
 
