@@ -335,6 +335,31 @@ def test_copies_are_equal_and_say_that_they_cannot_be_drawn(device: hizvk.Device
         assert other == told
         with pytest.raises(ValueError, match=r"has lost its pyramid.*CullResult\.explain"):
             other.plot()
+        assert other._repr_html_() is None  # a notebook shows its text
+        assert other._repr_png_() is None
+
+
+def test_what_a_lost_device_holds_shows_as_text(
+    device: hizvk.Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hiz = device.pyramid(wall(), camera(), kind="z")
+
+    def lost(*_: object, **__: object) -> None:
+        raise hizvk.DeviceLostError("the device is lost")
+
+    monkeypatch.setattr(hizvk.Pyramid, "level", lost)
+    assert hiz._repr_html_() is None
+    assert hiz._repr_png_() is None
+
+
+@needs_matplotlib
+def test_a_member_of_a_hidden_group_names_the_groups_test(device: hizvk.Device) -> None:
+    low = np.random.default_rng(5).uniform((-9, -1, -40), (-4, 1, -30), (2000, 3))
+    seen = culled(device, hizvk.Boxes(low, low + 0.1), hierarchy=True)
+    told = next(one for i in range(0, 2000, 100) if (one := seen.explain(i)).group is not None)
+    assert "its group of 64 was hidden as a whole" in texts(told.plot())
+    assert told.group is not None
+    assert "nearest depth of the instance: 3" in texts(told.group.plot())
 
 
 # -- figures ---------------------------------------------------------------------------------------
