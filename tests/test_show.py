@@ -14,6 +14,7 @@ import re
 import subprocess
 import sys
 from base64 import b64decode
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -203,6 +204,14 @@ def test_a_result_shows_red_and_white_boxes(device: hizvk.Device) -> None:
     assert decoded(picture_in(page)).shape == shown.shape
     for text, count in (("kept", 1), ("culled: hidden", 1), ("culled: outside the view", 1)):
         assert re.search(rf"{text}</td><td[^>]*>{count}</td>", page), text
+
+
+def test_a_notebook_shows_hints(device: hizvk.Device) -> None:
+    behind = hizvk.Boxes([(-1.0, -1, 5), (1, 1, 7)], [(0.0, 0, 6), (2, 2, 8)])
+    seen = culled(device, behind)
+    (hint,) = seen.hints()
+    assert f"Hint: {escape(hint)}" in seen._repr_html_()
+    assert "Hint" not in culled(device)._repr_html_()
 
 
 def test_results_without_verdicts(device: hizvk.Device) -> None:
