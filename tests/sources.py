@@ -91,7 +91,12 @@ def _wrong_cargo(words: list[str]) -> str | None:
         files = [
             path
             for place in places
-            for path in (place.parent.glob("*.rs") if place.name == "main.rs" else [place])
+            # A test's modules lie in a folder of its name.
+            for path in (
+                place.parent.glob("*.rs")
+                if place.name == "main.rs"
+                else [place, *place.with_suffix("").glob("*.rs")]
+            )
         ]
     else:
         return f"{kind}: expected --test, --example or --bin"
