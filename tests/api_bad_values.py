@@ -267,7 +267,7 @@ SAMPLING: list[Bad] = [
     (1, TypeError, "got int 1"),
 ]
 POINTS: list[Bad] = [
-    (np.zeros((2, 3)), TypeError, "expected Points, got (2, 3) float64"),
+    (np.zeros((2, 3)), TypeError, "expected Points, as hizvk.Points(xyz) makes them, got (2, 3)"),
     (None, TypeError, "got None"),
 ]
 RADIUS: list[Bad] = [
@@ -1005,7 +1005,18 @@ TABLES: dict[str, Table] = {
                 (
                     [(camera(), np.ones((6, 8)), np.zeros((8, 6, 3), np.uint8))],
                     ValueError,
-                    "expected images (6, 8, 3) (the camera's size), got (8, 6, 3) uint8",
+                    "expected images (6, 8, 3) (the camera's size), got (8, 6, 3) uint8; an image "
+                    "of another size goes with camera.resized",
+                ),
+                (
+                    [(camera(), np.ones((6, 8)), np.zeros((6, 8, 4), np.uint8))],
+                    ValueError,
+                    "got (6, 8, 4) uint8; without the alpha it is image[..., :3]",
+                ),
+                (
+                    [(camera(), np.ones((6, 8)), np.zeros((6, 8), np.uint8))],
+                    ValueError,
+                    "got (6, 8) uint8; a grey one goes as np.dstack([image] * 3)",
                 ),
             ],
             "kind": KIND,
