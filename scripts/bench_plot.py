@@ -58,7 +58,9 @@ def scene_of(text: str, key: str) -> SceneResult:
                 pareto="P" in times[0],
             )
         )
-    views, size = re.search(r"(\d+) views of (\d+x\d+)", found[1]).groups()  # type: ignore[union-attr]
+    told = re.search(r"(\d+) views of (\d+x\d+)", found[1])
+    assert told is not None
+    views, size = told.groups()
     instances = re.search(r"([\d,]+)\s+instances\s+\(", found[1])
     width, height = size.split("x")
     numbers = dict.fromkeys(

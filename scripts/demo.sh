@@ -6,3 +6,5 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 scripts/setup.sh
 step "demo" "$VENV/bin/hizvk" demo "$@"
+say "note: the module in .venv is a development build, whose uploads take longer"
+printf '   make wheel builds the one to measure or to use; hizvk doctor tells them apart\n'

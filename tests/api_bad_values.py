@@ -1719,7 +1719,11 @@ TABLES: dict[str, Table] = {
                 (None, TypeError, "got None"),
             ],
             "occluders": [
-                ("wall", TypeError, "expected a Mesh, a mesh of trimesh or Open3D"),
+                (
+                    "wall",
+                    TypeError,
+                    "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a list",
+                ),
                 ([TETRAHEDRON, 3], TypeError, "got int 3"),
             ],
             "title": [(3, TypeError, "expected a text, got int 3")],
@@ -2115,7 +2119,7 @@ RESUME: list[Bad] = [
     ("sweep.npz", TypeError, "expected a Sweep or None, got str 'sweep.npz'"),
 ]
 MESHES: list[Bad] = [
-    (3, TypeError, "expected a Mesh, a mesh of trimesh or Open3D, or a sequence of them"),
+    (3, TypeError, "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a sequence"),
     ([3], TypeError, "got int 3"),
 ]
 SIDE: list[Bad] = [(0, ValueError, "got int 0"), (64.0, TypeError, "got float 64.0")]
@@ -2262,7 +2266,7 @@ TABLES |= {
             "heights": [
                 (np.zeros(4), ValueError, "expected float (rows, columns), got (4,) float64"),
                 (np.zeros((1, 4)), ValueError, "expected at least 2 x 2 heights, got (1, 4)"),
-                (np.zeros((3, 4), dtype=int), TypeError, "got (3, 4) int64"),
+                (np.zeros((3, 4), dtype=bool), TypeError, "got (3, 4) bool"),
                 (np.full((3, 4), INF), ValueError, "expected finite heights, or NaN for no data"),
             ],
             "cell_size": [

@@ -810,6 +810,46 @@ def test_depth_that_cannot_hide_is_hinted_at(device: hizvk.Device, reversed_z: b
     )
 
 
+def test_a_camera_matrix_of_a_larger_image_is_hinted_at() -> None:
+    k = np.array([[1000.0, 0, 960], [0, 1000, 540], [0, 0, 1]])
+    pose = {"world_from_camera": np.eye(4), "near": 0.1}
+    small = (270, 480)
+    makers: list[Callable[[Any], hizvk.Camera]] = [
+        lambda size: hizvk.Camera.from_opencv(k, pixel_center="half", size=size, **pose),
+        lambda size: hizvk.Camera.from_opengl(k=k, pixel_center="half", size=size, **pose),
+        lambda size: hizvk.Camera.from_colmap(
+            "PINHOLE", [1000, 1000, 960, 540], size=size, **pose
+        ),
+    ]  # fmt: skip
+    for make in makers:
+        with pytest.warns(
+            hizvk.HizWarning, match=r"^k, size: .*camera\.resized\(\(270, 480\)\)$"
+        ) as told:
+            make(small)
+        assert told[0].filename == __file__
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert make((1080, 1920)).resized(small).size == small
+            make((540, 1920))  # a crop may have its principal point on its border
+
+
+def test_plain_arrays_are_told_which_bounds_they_look_like() -> None:
+    for shape, way in (
+        ((7, 3), "hizvk.Points(bounds)"),
+        ((7, 6), "hizvk.Boxes(bounds[:, :3], bounds[:, 3:])"),
+        ((7, 8, 3), "hizvk.Boxes.from_corners(bounds)"),
+        ((7, 4, 4), "hizvk.OrientedBoxes.from_transforms(bounds)"),
+    ):
+        bounds = np.zeros(shape)
+        if shape[1:] == (4, 4):
+            bounds[:] = np.eye(4)
+        with pytest.raises(TypeError) as caught:
+            hizvk.visible(bounds, CAMERA, depth=IMAGE, kind="z")  # type: ignore[arg-type]
+        assert f"; pass {way}, if that is what the numbers are" in str(caught.value)
+        made = eval(way, {"hizvk": hizvk, "bounds": bounds})
+        hizvk.visible(made, CAMERA, depth=np.ones(CAMERA.size), kind="z")
+
+
 def test_points_are_not_sent_to_sample_coverage(device: hizvk.Device) -> None:
     """It culls every one of them."""
     wall = hizvk.Mesh([[-1.0, -1, -5], [1, -1, -5], [0, 1, -5]], [[0, 1, 2]])

@@ -7,11 +7,12 @@ import pickle
 import subprocess
 import sys
 import types
+from typing import Any
 
 import pytest
 
 import hizvk
-from hizvk import cli
+from hizvk import _core, cli, doctor
 
 INSTALL_LINE = "apt install libvulkan1 mesa-vulkan-drivers"
 
@@ -53,7 +54,7 @@ def test_doctor_tells_what_is_wrong(
     assert "HIZVK_ADAPTER has to name one of the adapters" in text
     monkeypatch.delenv("HIZVK_ADAPTER")
     monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere/driver.json")
-    assert any(check.name == "vulkan drivers" and not check.passed for check in cli.checks())
+    assert any(check.name == "vulkan drivers" and not check.passed for check in doctor.checks())
 
 
 @pytest.mark.parametrize("name", ["demo", "bench"])
@@ -184,3 +185,61 @@ def test_a_limit_has_a_name_and_numbers() -> None:
         device.render_depth(device.occluders([]), camera)
     assert caught.value.requested == side
     assert caught.value.allowed == device.max_image_side
+
+
+def test_doctor_says_what_each_finding_means(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = doctor.checks()
+    assert {check.name.partition(" (")[0] for check in found} <= doctor.MEANINGS.keys()
+    assert cli.main(["doctor"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    for check in found:
+        at = lines.index(f"ok   {check.name}: {check.detail}")
+        assert lines[at + 1] == f"     {check.meaning}"
+        if check.advice:
+            assert lines[at + 2] == f"     -> {check.advice}"
+    assert lines[-1] == "all is well: culls work here"
+    assert any("development build" in check.detail for check in found) == (
+        _core.__build__ == "development"
+    )
+    # llvmpipe is a software driver, and this build is not the one that is released.
+    assert any("a software driver" in check.advice for check in found)
+
+    class NoSuchPackage:
+        @staticmethod
+        def find_spec(name: str) -> None:
+            return None
+
+    monkeypatch.setattr(doctor.importlib, "util", NoSuchPackage)  # type: ignore[attr-defined]
+    absent = doctor._extras()
+    assert absent.passed
+    assert absent.advice.startswith("without matplotlib")
+    assert "pip install" in absent.advice
+
+
+def test_whatever_does_not_pass_has_advice(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A device that cannot be made, one that is wrong, and one that fails."""
+
+    class Wrong(hizvk.Device):
+        def pyramid(self, *args: object, **kwargs: object) -> Any:
+            raise hizvk.HizError("out of order")
+
+    monkeypatch.setattr(doctor, "_stage_times", lambda _: doctor.DoctorCheck("extras", True, ""))
+    monkeypatch.setattr(hizvk, "Device", Wrong)
+    found = doctor.checks()
+    assert [check.name for check in found if not check.passed] == [
+        "cull (reversed depth)", "cull (standard depth)",
+    ]  # fmt: skip
+    assert all(check.advice for check in found if not check.passed)
+    assert cli.main(["doctor"]) == 1
+    assert f"2 of {len(found)} failed; the line with ->" in capsys.readouterr().out
+
+    def none() -> Any:
+        raise hizvk.HizError("no device")
+
+    monkeypatch.setattr(hizvk, "Device", none)
+    monkeypatch.delenv("HIZVK_ADAPTER", raising=False)
+    assert "another adapter may work" in doctor.checks()[-1].advice

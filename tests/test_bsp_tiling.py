@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+import documented
 import hizvk
 from hizvk.bench import tiling as bench
 from hizvk.scenes import box_mesh, village
@@ -53,3 +54,19 @@ def test_the_bench_compares_with_depth_tiles(tmp_path: Path) -> None:
         assert row.parts >= row.triangles > 0
         assert 0 < row.bits_bytes < row.depth_bytes
     assert (tmp_path / "report.md").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", bench.NAMES)
+def test_the_page_quotes_the_command(tmp_path: Path, scene: str) -> None:
+    """If this is red, put the numbers of ``hizvk bench --tiling`` into docs/methods.md."""
+    found = bench.run(tmp_path, keys=[scene])
+    if found.missing:
+        pytest.skip(found.missing[0])
+    assert found.passed
+    shown = [
+        list(row.values())
+        for row in documented.table(documented.page("methods.md"), "scene", "tree")
+        if row["scene"] == scene
+    ]
+    assert shown == [bench.tree_cells(row) for row in found.rows]

@@ -24,8 +24,9 @@ PAGES = sorted(
 )
 FENCE = re.compile(r"^```(?P<language>[^\n]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
 #: Languages that are shown and not run here.
-#: rustdoc runs `rust` (`crates/hiz_core/src/lib.rs`).
+#: rustdoc runs `rust` (`crates/hiz_core/src/lib.rs`), and cargo runs the files that are included.
 NOT_RUN = {"sh", "text", "rust", "toml", "wgsl", "json", "{eval-rst}", "{toctree}"}
+NOT_RUN |= {"{literalinclude}"}
 #: The pages whose Rust blocks rustdoc compiles and runs.
 BY_RUSTDOC = ("README.md", "docs/rust.md")
 

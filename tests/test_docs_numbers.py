@@ -20,7 +20,7 @@ import pytest
 import documented
 import hizvk
 from documented import page
-from hizvk.bench import command
+from hizvk.bench import command, footprints, texts, texts_report
 from tools.speed import bounds, figures
 from tools.speed.run import WORKLOADS, Run
 
@@ -113,3 +113,34 @@ def test_few_and_many_bounds_are_still_kept_so() -> None:
     assert len(ours) == 2 * len(bounds.COUNTS)
     shown = documented.table(page("performance.md"), "rasteriser", "bounds")
     assert {(row["rasteriser"], row["bounds"]): row["kept"] for row in shown} == ours
+
+
+def test_the_texts_still_lose_so(tmp_path: Path) -> None:
+    """If this is red, run ``hizvk bench --texts`` and put its table into docs/methods.md."""
+    methods = page("methods.md")
+    if not documented.is_of_this_driver(page("bench.md")):
+        pytest.skip("docs/methods.md was printed on another driver")
+    if importlib.util.find_spec("embreex") is None:
+        pytest.skip("embreex, by which the truth is cast, is not installed")
+    found = texts.run(tmp_path, keys=("room",), repetitions=1)
+    shown = documented.table(methods, "scene", "test", "visible lost")
+    counts = [
+        {key: row[key] for key in ("test", "visible lost", "of them", "hidden kept")}
+        for row in shown
+        if row["scene"] == "room"
+    ]
+    head = ("test", "visible lost", "of them", "hidden kept")
+    ours = [
+        dict(zip(head, (cell.strip("*") for cell in row[1:5]), strict=True))
+        for row in texts_report.table(found)
+    ]
+    assert counts == ours
+
+
+@pytest.mark.slow
+def test_footprints_still_keep_so() -> None:
+    """If this is red, run ``python -m hizvk.bench.footprints``; docs/methods.md has its table."""
+    if not documented.is_of_this_driver(page("bench.md")):
+        pytest.skip("docs/methods.md was printed on another driver")
+    lines = footprints.table(footprints.measure(hizvk.Device()))
+    assert "\n".join(lines) in page("methods.md")

@@ -43,6 +43,8 @@ LAST_LINES = {
     "indirect_draws.py": "draw 600 instances from 0 on, 36 indices from 12 on, base vertex -4",
     # A closed house; each ball of the ring is nearer to some camera than the house.
     "many_views.py": "seen from 24 views: 0 inside, 60 around",
+    # 200 boxes stand before the wall, and 200 in its shadow.
+    "pictures.py": "white: 200 kept, red: 200 culled",
     # At a distance of 20 m the wall of 6 x 6 m hides 12 x 12 m, and there are 8 x 8 m.
     "polygon_soup.py": "kept: 100 % of the wall, 0 % of what it hides",
     # The answer is that of a blocking read.
@@ -59,6 +61,8 @@ LAST_LINES = {
     "two_passes.py": "pixels lost: 0 by two passes, 0 by hand; the stale answer loses some: True",
     # x is -9, -7, ... 9: a ball of 0.5 m is hidden up to 3.5 m from the middle.
     "updates.py": "the walker is hidden in frames 3, 4, 5, 6",
+    # From 60 m, 100 m before a ridge of 8 m, the ground shows again 15 m behind it.
+    "viewshed.py": "cells seen behind the ridge: 0 from the ground, 234 from a tower",
     # The wall hides what is below 1 m of the cars behind it, and they are 1.5 m high.
     "visible_fraction.py": "level 4: 4 of 4 in the open, 0 of 4 behind the wall",
 }

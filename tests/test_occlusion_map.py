@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+import documented
 import hizvk
 from hizvk.bench import maps as bench
 from hizvk.scenes.fence import PARTS, fence
@@ -165,8 +166,11 @@ def test_nothing_certified_takes_a_map(device: hizvk.Device) -> None:
         hizvk.Device().cull_map(hizvk.Points([(0.0, 0.0, -5.0)]), CAMERA, maps)
 
 
-def test_the_bench_leaves_curve_maps_and_buffer(tmp_path: Path) -> None:
+def test_the_bench_leaves_curve_maps_and_buffer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("matplotlib", reason="pictures need matplotlib (pip install matplotlib)")
+    monkeypatch.setattr(bench, "PICTURE", 256)  # the larger picture takes seconds
     found = bench.run(tmp_path, keys=["fence"], instances=40, views=1)
     assert found.passed
     (scene,) = found.scenes
@@ -178,3 +182,21 @@ def test_the_bench_leaves_curve_maps_and_buffer(tmp_path: Path) -> None:
     names = [f"fence-map-{side}.png" for side in sides]
     for name in [*names, "fence-maps.png", "fence-estimate.png", "curve.png", "report.md"]:
         assert (tmp_path / name).stat().st_size > 60
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", bench.NAMES)
+def test_the_page_quotes_the_command(tmp_path: Path, scene: str) -> None:
+    """If this is red, put the numbers of ``hizvk bench --maps`` into docs/methods.md."""
+    text = documented.page("methods.md")
+    if not documented.is_of_this_driver(text):
+        pytest.skip(f"docs/methods.md was printed on another driver than {hizvk.Device().adapter}")
+    (found,) = bench.run(tmp_path, keys=[scene]).scenes
+    printed = {(scene, *bench.cells(row)[:6]) for row in found.rows}
+    shown = {
+        tuple(row.values())
+        for row in documented.table(text, "scene", "way")
+        if row["scene"] == scene
+    }
+    assert len(shown) >= 4
+    assert shown <= printed

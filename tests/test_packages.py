@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import hizvk
-from hizvk import cli, extras
+from hizvk import cli, doctor, extras
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -190,7 +190,7 @@ def names_of_checks(monkeypatch: pytest.MonkeyPatch, system: str, loader: bool) 
 
     monkeypatch.setattr(sys, "platform", system)
     monkeypatch.setattr(ctypes, "CDLL", load)
-    found = {check.name: check.passed for check in cli.checks()}
+    found = {check.name: check.passed for check in doctor.checks()}
     assert opened == {"darwin": [], "win32": ["vulkan-1.dll"]}.get(system, ["libvulkan.so.1"])
     return found
 

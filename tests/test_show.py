@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 import gc
 import io
+import itertools
 import pickle
 import re
 import subprocess
@@ -110,6 +111,57 @@ def test_near_is_lighter_and_a_bare_matrix_shows_ndc(device: hizvk.Device) -> No
     assert (np.diff(lightness.mean(axis=0)[4:-4:32]) < -5.0).all()
     bare = hizvk.Camera.from_matrices(np.eye(4), size=SIZE, reversed_z=False)
     assert "NDC depth" in device.pyramid(np.full(SIZE, 0.5), bare, kind="ndc")._repr_html_()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 257), (257, 1), (1080, 1920)])
+def test_images_of_any_size(device: hizvk.Device, size: tuple[int, int]) -> None:
+    view = camera(size=size)
+    hiz = device.pyramid(np.full(size, 10.0), view, kind="z")
+    seen = device.cull(device.instances(BOXES), view, hiz)
+    for thing in (hiz, seen, seen.explain(0)):
+        assert decoded(thing._repr_png_()).size > 0
+        assert len(thing._repr_html_()) < 100_000
+
+
+#: Linear RGB as people without red and without green receptors see it (Machado, Oliveira and
+#: Fernandes 2009, severity 1).
+BLIND = {
+    "nobody": np.eye(3),
+    "protanopia": np.array(
+        [
+            [0.152286, 1.052583, -0.204868],
+            [0.114503, 0.786281, 0.099216],
+            [-0.003882, -0.048116, 1.051998],
+        ]
+    ),
+    "deuteranopia": np.array(
+        [
+            [0.367322, 0.860646, -0.227968],
+            [0.280085, 0.672501, 0.047413],
+            [-0.011820, 0.042940, 0.968881],
+        ]
+    ),
+}
+
+
+@pytest.mark.parametrize("who", BLIND)
+def test_colours_can_be_told_apart(who: str) -> None:
+    """By at least 25 in CIELAB, where 2 is a difference that people notice."""
+
+    def lab(colour: str) -> npt.NDArray[np.float64]:
+        given = np.array(colours.rgb(colour)) / 255.0
+        linear = np.where(given <= 0.04045, given / 12.92, ((given + 0.055) / 1.055) ** 2.4)
+        linear = np.clip(BLIND[who] @ linear, 0.0, 1.0)
+        to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+        xyz = np.array(to_xyz) @ linear / (0.9505, 1.0, 1.089)
+        f = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116)
+        return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+    drawn = [*colours.CLASS_COLOURS, colours.FRUSTUM, colours.BACKGROUND]
+    for one, other in itertools.combinations(drawn, 2):
+        assert np.linalg.norm(lab(one) - lab(other)) > 25.0, (one, other)
+    lightness = [lab(colour)[0] for colour in colours.VIRIDIS]
+    assert (np.diff(lightness) > 3.0).all()
 
 
 @pytest.mark.parametrize(

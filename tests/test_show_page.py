@@ -30,8 +30,8 @@ SIZE = (90, 160)
 #: Against a browser that hangs; one picture takes two seconds.
 GUARD_S = 120
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-#: Of the browser's window; the canvas has what the panel of 330 pixels leaves.
-WINDOW, CANVAS = (1130, 600), 800
+#: Of the browser's window; the canvas has what the panel of 350 pixels leaves.
+WINDOW, CANVAS = (1150, 600), 800
 
 
 def camera() -> hizvk.Camera:
@@ -293,6 +293,8 @@ function look(colour) {
 }
 press("4"); press("c"); draw();
 told.size = [width, height];
+const panel = document.querySelector("aside");
+told.cut = [panel.scrollWidth - panel.clientWidth, document.body.scrollWidth - innerWidth];
 [told.kept, told.hidden] = [look(colours[0]), look(colours[1])];
 press("2"); draw();
 told.without = look(colours[1])[0];
@@ -327,6 +329,8 @@ def test_keys_mouse_and_pixels(browser: Browser, device: hizvk.Device, tmp_path:
     assert distance[4] > distance[3] == distance[2]
     # From the camera everything lies where the camera has it.
     wide, tall = found["size"]
+    assert wide == CANVAS
+    assert max(found["cut"]) <= 0  # no text is cut off
     focal = tall / 2 / np.tan(np.radians(30))
     for (_, first, last), sides in (
         (found["kept"], (3.4 / 20.6, 4.6 / 19.4)),

@@ -282,7 +282,7 @@ class Workers(Executor):
         self.copies, self.ran, self.sent = 0, list[int](), set[str]()
         self._choose, self._sees = choose, sees
 
-    def submit(self, fn: Any, /, task: Any, block: Block, scene: Any = None) -> Any:  # type: ignore[override]
+    def submit(self, fn: Any, /, task: Any, block: Block, scene: Any = None) -> Any:
         worker = self._choose(len(self.know))
         self.copies += scene is not None
         self.sent |= {type(scene).__name__} if scene is not None else set()

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import TYPE_CHECKING, Final, TypedDict
 
 import numpy as np
 
 from . import _arguments, _rotations, foreign
+from .errors import HizWarning
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -147,6 +149,20 @@ def intrinsics(k: object) -> npt.NDArray[np.float64]:
         hint = "; it looks transposed" if result[:, 2].tolist() == [0.0, 0.0, 1.0] else ""
         raise ValueError(f"{expected}, got {result.tolist()}{hint}")
     return result
+
+
+def hint_at_size(k: npt.NDArray[np.float64], size: Size) -> None:
+    """Warns of a camera matrix that looks like that of a larger image."""
+    (cx, cy), (height, width) = k[:2, 2].tolist(), size
+    if cx > width and cy > height:
+        warnings.warn(
+            f"k, size: the principal point ({cx:g}, {cy:g}) lies below and beside the image of "
+            f"{size} pixels; if k belongs to a larger image, pass the size of that image, and take "
+            f"camera.resized({size})",
+            HizWarning,
+            # Over the constructor and its decorator to the caller.
+            stacklevel=4,
+        )
 
 
 def refuse_distortion(distortion: object) -> None:

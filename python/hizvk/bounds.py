@@ -453,7 +453,15 @@ def as_arrays(name: str, bounds: object) -> tuple[str, tuple[FloatArray, ...]]:
         case Points():
             return "points", (bounds.positions,)
     got = _arguments.describe(bounds)
-    raise TypeError(f"{name}: expected Spheres, Boxes, OrientedBoxes or Points, got {got}")
+    ways = {
+        (3,): f"hizvk.Points({name})",
+        (6,): f"hizvk.Boxes({name}[:, :3], {name}[:, 3:])",
+        (8, 3): f"hizvk.Boxes.from_corners({name})",
+        (4, 4): f"hizvk.OrientedBoxes.from_transforms({name})",
+    }
+    way = ways.get((_sides(bounds) or ())[1:])
+    hint = f"; pass {way}, if that is what the numbers are" if way else ""
+    raise TypeError(f"{name}: expected Spheres, Boxes, OrientedBoxes or Points, got {got}{hint}")
 
 
 def are_points(bounds: Bounds) -> bool:

@@ -309,6 +309,7 @@ class Camera:
         pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
         image = _camera_arguments.perspective_image(size, near, far, reversed_z)
         _camera_arguments.refuse_distortion(distortion)
+        _camera_arguments.hint_at_size(k, image["size"])
         projection = _pinhole(k, pixel_center, image)
         seen = {"k": k, "pixel_center": pixel_center}
         return cls._posed("from_opencv", seen, projection, pose, image, image["reversed_z"])
@@ -375,6 +376,7 @@ class Camera:
         model, params, k = _camera_arguments.colmap_intrinsics(model, params)
         pose = _camera_arguments.colmap_pose(qvec, tvec, camera_from_world, world_from_camera)
         image = _camera_arguments.perspective_image(size, near, far, reversed_z)
+        _camera_arguments.hint_at_size(k, image["size"])
         projection = _pinhole(k, "half", image)
         seen = {"model": model, "params": params}
         return cls._posed("from_colmap", seen, projection, pose, image, image["reversed_z"])
@@ -471,6 +473,7 @@ class Camera:
             k = _camera_arguments.intrinsics(k)
             pixel_center = _camera_arguments.pixel_center(pixel_center)
             _camera_arguments.refuse_distortion(distortion)
+            _camera_arguments.hint_at_size(k, image["size"])
             seen = {"k": k, "pixel_center": pixel_center}
             clip_from_camera = _pinhole(k, pixel_center, image) @ _OPENCV_FROM_OPENGL
         else:

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from ._types import DepthKind, Levels, Output
     from .depth import DepthArray
     from .mesh import MeshLike
-    from .methods import MapResult, OcclusionMap
+    from .methods.occlusion_map import MapResult, OcclusionMap
     from .options import CullKeywords, CullOptions, MeshLods, OptionKeywords
     from .progress import ProgressLike
     from .tolerance import Tolerance
@@ -980,9 +980,9 @@ class Device:
         Zhang, Manocha, Hudson and Hoff, "Visibility culling using hierarchical occlusion maps"
         (1997).
         """
-        from .methods import occlusion_map as module
+        from .methods.occlusion_map import made
 
-        return module.made(
+        return made(
             self,
             occluders,
             camera,
@@ -1030,9 +1030,9 @@ class Device:
         TypeError, ValueError
             They name the parameter, what it expects and what came.
         """
-        from .methods import occlusion_map as module
+        from .methods.occlusion_map import culled
 
-        return module.culled(self, bounds, camera, maps, negligible_px=negligible_px, copies=copies)
+        return culled(self, bounds, camera, maps, negligible_px=negligible_px, copies=copies)
 
     def temporal(self, instances: Instances, *, early_capacity: int | None = None) -> Temporal:
         """Makes the two passes of a view, which draw each frame what was visible, then the rest.

@@ -153,8 +153,8 @@ class Question:
             return (
                 f"depth: {100.0 * known.mean():.1f} % of the pixels have a depth, hardly any of "
                 "them beside another, and empty ones are far, so next to nothing can be hidden; if "
-                "depth is missing there (a LiDAR, not the sky), hizvk.fill_depth fills it, and says "
-                "what that costs the promise",
+                "depth is missing there (a LiDAR, not the sky), hizvk.fill_depth fills it and "
+                "says what that costs the promise",
             )
         return ()
 

@@ -14,7 +14,7 @@ from ._types import DepthKind, Up, words
 from .errors import HizError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     import numpy as np
     import numpy.typing as npt
@@ -215,7 +215,7 @@ class PicturedResult(_Shown):
         path: str | PathLike[str],
         bounds: Bounds | None = None,
         *,
-        occluders: MeshLike | list[MeshLike] | None = None,
+        occluders: MeshLike | Sequence[MeshLike] | None = None,
         up: Up | None = None,
         most: int = MOST,
         unit: str = "m",

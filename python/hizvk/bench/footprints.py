@@ -114,7 +114,7 @@ def measure(
                 visible=int(visible.sum()),
                 kept=result.mask,
                 lost=int(caster.firm(one, sight, given, wrong).sum()),
-                texels=result.stats.texels_read,
+                texels=result.stats.texels_read or 0,
             )
         )
     middle = (scene.box_min + scene.box_max) / 2.0

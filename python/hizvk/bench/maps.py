@@ -11,7 +11,6 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
-from statistics import median
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -20,11 +19,11 @@ from ..bounds import Boxes
 from ..commands import arguments as args
 from ..commands import figure, report
 from ..commands.page import Page
-from ..commands.progress import Progress
 from ..device import Device
 from ..explanation import Verdict
 from ..measuring.configuration import DESCENT
 from ..occluders import select_occluders
+from ..progress import Progress
 from ..scenes import embree
 from ..scenes.fence import PARTS, fence
 from ..scenes.truth import linear_depth, make_caster
@@ -45,7 +44,7 @@ if TYPE_CHECKING:
     from ..scenes import Scene, View
     from ..scenes.truth import Caster
 
-__all__ = ["NAMES", "Report", "main", "run"]
+__all__ = ["NAMES", "Report", "cells", "main", "run"]
 
 PROG: Final = "hizvk bench --maps"
 NAMES: Final = ("fence", "hedge", "village", "boulders", "city", "room")
@@ -162,25 +161,22 @@ def run(
     found = Report(command=command, seed=seed, adapter=device.adapter)
     if not embree.can_cast():
         found.missing.append(
-            f"{embree.MISSING}; what is seen is then that of boxes before the rendered depth"
+            f"{embree.missing()}; what is seen is then that of boxes before the rendered depth"
         )
     if not figure.can_draw():
-        found.missing.append(figure.MISSING)
-    steps = Progress(len(keys), f"{PROG}: {', '.join(keys)}")
-    try:
+        found.missing.append(figure.missing())
+    with Progress(True, f"{PROG}: {', '.join(keys)}", len(keys), after_s=0.0) as steps:
         for key in keys:
             scene, meshes = _scene(key, instances, views or VIEWS, seed)
-            found.scenes.append(_measure(device, key, scene, meshes, max_occluders))
+            measured = _measure(device, key, scene, meshes, max_occluders)
+            found.scenes.append(measured)
             if figure.can_draw():
                 from . import maps_pictures as drawing
 
-                database = _database(device, meshes)[0]
-                found.pictures.append(
-                    drawing.maps(out, key, device, database, scene.views[0], found.scenes[-1].limit)
-                )
+                walls, _ = _database(device, meshes)
+                view, limit = scene.views[0], measured.limit
+                found.pictures.append(drawing.maps(out, key, device, walls, view, limit))
             steps.step(key)
-    finally:
-        steps.close()
     if figure.can_draw():
         from . import maps_pictures as drawing
 
@@ -316,13 +312,13 @@ def _with(scene: Scene, meshes: Sequence[Mesh]) -> Scene:
 
 
 def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
-    """The median time of some calls in milliseconds, and what the last one returned."""
+    """The least time of some calls in milliseconds, and what the last one returned."""
     times = []
     for _ in range(REPETITIONS):
         started = time.perf_counter()
         made = work()
         times.append(1e3 * (time.perf_counter() - started))
-    return median(times), made
+    return min(times), made
 
 
 def _add(

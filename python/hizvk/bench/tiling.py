@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from statistics import median
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -19,9 +18,9 @@ from .._core import DepthTiles
 from ..commands import arguments as args
 from ..commands import report
 from ..commands.page import Page
-from ..commands.progress import Progress
 from ..device import Device
 from ..methods import BspTiling
+from ..progress import Progress
 from ..scenes import village
 from ..scenes.boulders import boulders
 from . import catalogue
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
     from ..adapter import Adapter
     from ..scenes import Scene
 
-__all__ = ["NAMES", "Report", "Row", "main", "run"]
+__all__ = ["NAMES", "Report", "Row", "image_cells", "main", "run", "tree_cells"]
 
 PROG: Final = "hizvk bench --tiling"
 NAMES: Final = ("village", "boulders", "city", "room", "mountains")
@@ -67,7 +66,7 @@ class Row:
     tiled: int
     """Parts that were tiled in a view, on the average."""
     bits_ms: float
-    """A view by coverage bits, one thread."""
+    """A view by coverage bits, one thread; the least of `REPETITIONS`."""
     depth_ms: float
     """A view by depth tiles, one thread."""
     bits_bytes: int
@@ -108,44 +107,46 @@ class Report:
             *(f"Left out: {each}" for each in self.missing),
         )
         page.heading("Trees")
-        page.table(
-            "scene | tree | triangles | parts | planes | MiB | seconds to build",
-            (
-                [
-                    row.key,
-                    row.tree,
-                    f"{row.triangles:,}",
-                    f"{row.parts / max(row.triangles, 1):.2f} x",
-                    f"{row.nodes:,}",
-                    f"{row.tree_bytes / 2**20:.1f}",
-                    f"{row.build_s:.2f}",
-                ]
-                for row in self.rows
-            ),
-            left=2,
-        )
+        page.table(TREES, (tree_cells(row) for row in self.rows), left=2)
         page.heading(f"Images of {width}x{height}, one thread")
-        page.table(
-            "scene | tree | same coverage | tiled | seen | ms, bits | ms, depth tiles | ratio | "
-            "KiB, bits | KiB, depth tiles",
-            (
-                [
-                    row.key,
-                    row.tree,
-                    "yes" if row.same else "NO",
-                    f"{row.tiled:,}",
-                    f"{row.visible:,}",
-                    f"{row.bits_ms:.2f}",
-                    f"{row.depth_ms:.2f}",
-                    f"{row.bits_ms / row.depth_ms:.1f}",
-                    f"{row.bits_bytes / 1024:.0f}",
-                    f"{row.depth_bytes / 1024:.0f}",
-                ]
-                for row in self.rows
-            ),
-            left=2,
-        )
+        page.table(IMAGES, (image_cells(row) for row in self.rows), left=2)
         return page
+
+
+TREES: Final = "scene | tree | triangles | parts | planes | tiled | seen | MiB, tree"
+IMAGES: Final = (
+    "scene | tree | same coverage | ms, bits | ms, depth tiles | ratio | KiB, bits | "
+    "KiB, depth tiles | seconds to build"
+)
+
+
+def tree_cells(row: Row) -> list[str]:
+    """A row of the table of trees, whose numbers repeat with the seed."""
+    return [
+        row.key,
+        row.tree,
+        f"{row.triangles:,}",
+        f"{row.parts / max(row.triangles, 1):.2f} x",
+        f"{row.nodes:,}",
+        f"{row.tiled:,}",
+        f"{row.visible:,}",
+        f"{row.tree_bytes / 2**20:.1f}",
+    ]
+
+
+def image_cells(row: Row) -> list[str]:
+    """A row of the table of images."""
+    return [
+        row.key,
+        row.tree,
+        "yes" if row.same else "NO",
+        f"{row.bits_ms:.2f}",
+        f"{row.depth_ms:.2f}",
+        f"{row.bits_ms / row.depth_ms:.1f}",
+        f"{row.bits_bytes / 1024:.0f}",
+        f"{row.depth_bytes / 1024:.0f}",
+        f"{row.build_s:.2f}",
+    ]
 
 
 def run(
@@ -183,8 +184,7 @@ def run(
     out.mkdir(parents=True, exist_ok=True)
     device = Device()
     found = Report(command, seed, size or SIZE, device.adapter)
-    steps = Progress(len(keys), f"{PROG}: {', '.join(keys)}")
-    try:
+    with Progress(True, f"{PROG}: {', '.join(keys)}", len(keys), after_s=0.0) as steps:
         for key in keys:
             try:
                 scene = _scene(key, views or VIEWS, seed)
@@ -192,8 +192,6 @@ def run(
             except catalogue.Missing as missing:
                 found.missing.append(str(missing))
             steps.step(key)
-    finally:
-        steps.close()
     found.seconds = time.perf_counter() - started
     report.write(out, found.as_data(), found.page())
     return found
@@ -231,8 +229,8 @@ def _measure(device: Device, key: str, scene: Scene, size: Size) -> list[Row]:
                 of_depth.append(ms)
             same &= bool(np.array_equal(image.coverage.ravel(), depth.coverage()))
             seen.append(image)
-            bits_ms.append(median(of_bits))
-            depth_ms.append(median(of_depth))
+            bits_ms.append(min(of_bits))
+            depth_ms.append(min(of_depth))
         rows.append(
             Row(
                 key=key,

@@ -124,7 +124,7 @@ def recommend(
         depth does not hide stays unclear.
     cameras : Camera or sequence of Camera
         Typical views.
-    occluders : Occluders, Mesh, a mesh of trimesh, Open3D or PyVista, or a sequence of meshes
+    occluders : Occluders, Mesh, one of trimesh, Open3D or PyVista, or a sequence of them
         What hides.
         Then rendering is part of the time, and conservative depth images, small ones too, are among
         the candidates.

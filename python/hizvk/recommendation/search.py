@@ -140,6 +140,9 @@ class Search:
 
     def _measure(self, chosen: list[Configuration]) -> None:
         asked = self._question
+        steps = number_of_steps(chosen, asked.source.views, asked.repetitions)
+        if self._steps.total is not None:
+            self._steps.total = max(self._steps.total, self._steps.done + steps)
         times = time_all(
             chosen,
             asked.volumes,

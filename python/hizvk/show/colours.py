@@ -7,7 +7,7 @@ Depth has the colours of *viridis* (van der Walt and Smith 2015, CC0), whose lig
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BACKGROUND", "CLASS_COLOURS", "FRUSTUM", "INK", "MARK", "SKY", "Scale", "depth_table", "grey",
-    "rgb", "scale_of",
+    "rgb", "scale_of", "thinned",
 ]  # fmt: skip
 
 BACKGROUND: Final = "#14181c"
@@ -93,6 +93,12 @@ def scale_of(depth: npt.NDArray[np.floating]) -> Scale:
         wide = 0.1 * max(abs(low), 1e-3)
         return Scale(low - wide, high + wide, False)
     return Scale(low, high, False)
+
+
+def thinned(depth: npt.NDArray[Any], most: int = 800) -> npt.NDArray[Any]:
+    """Every n-th row and column, so that no side is longer than about `most`."""
+    step = max(-(-max(depth.shape) // most), 1)
+    return depth[::step, ::step]
 
 
 def grey(depth: npt.NDArray[np.floating]) -> _Image:

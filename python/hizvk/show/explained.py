@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from ..view_depth import RayView, converted
-from .colours import CLASS_COLOURS, MARK, rgb, scale_of
+from .colours import CLASS_COLOURS, MARK, rgb, scale_of, thinned
 from .html import document, number
 from .lines import draw
 from .png import png
@@ -109,7 +109,7 @@ class Explained(NamedTuple):
         """A PNG of the depth around the rectangle (white), with the texels that were read."""
         x0, y0, x1, y1 = self._window()
         depth = self._metric(self.depth)
-        shown = scale_of(depth).colours(depth[y0:y1, x0:x1])
+        shown = scale_of(thinned(depth)).colours(depth[y0:y1, x0:x1])
         factor = max(SIDE // max(x1 - x0, y1 - y0), 1)
         step = max(max(x1 - x0, y1 - y0) // SIDE, 1)
         image = shown[::step, ::step].repeat(factor, axis=0).repeat(factor, axis=1)
@@ -156,7 +156,7 @@ class Explained(NamedTuple):
 
         x0, y0, x1, y1 = self._window()
         depth = self._metric(self.depth)
-        scale = scale_of(depth)
+        scale = scale_of(thinned(depth))
         axis.imshow(
             scale.colours(depth[y0:y1, x0:x1]), interpolation="nearest", extent=(x0, x1, y1, y0)
         )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from .colours import SKY, VIRIDIS, depth_table, scale_of
+from .colours import SKY, VIRIDIS, depth_table, scale_of, thinned
 from .html import document, number
 from .png import png
 
@@ -50,7 +50,7 @@ class Levels(NamedTuple):
     @property
     def scale(self) -> Scale:
         """One scale for all levels."""
-        return scale_of(self.levels[0][1])
+        return scale_of(thinned(self.levels[0][1]))
 
     def picture(self) -> bytes:
         """A PNG: level 0 at the left, and the others below one another, each at its own scale."""
@@ -58,7 +58,7 @@ class Levels(NamedTuple):
         height, width = self.size
         shrunk = max(height, width) / SIDE
         tall, wide = max(round(height / shrunk), 1), max(round(width / shrunk), 1)
-        first = _resized(scale.colours(self.levels[0][1]), tall, wide)
+        first = scale.colours(_resized(self.levels[0][1], tall, wide))
         if len(self.levels) == 1:
             return png(first)
         # A mip chain: half as tall each time; what is smaller than 2 pixels is left out.
@@ -67,7 +67,7 @@ class Levels(NamedTuple):
             sides = round(tall / 2.0**k), round(wide / 2.0**k)
             if min(sides) < 2:
                 break
-            rest.append(_resized(scale.colours(texels), *sides))
+            rest.append(scale.colours(_resized(texels, *sides)))
         below = sum(len(one) + GAP for one in rest)
         across = max((one.shape[1] for one in rest), default=0)
         sheet = np.full((max(tall, below), wide + GAP + across, 3), 255, np.uint8)
@@ -122,7 +122,7 @@ class Levels(NamedTuple):
             k, texels = self.levels[place]
             # A texel covers 2^k pixels, so the last ones may reach past the image.
             axis.imshow(
-                scale.colours(texels),
+                scale.colours(thinned(texels)),
                 interpolation="nearest",
                 extent=(0, texels.shape[1] << k, texels.shape[0] << k, 0),
             )
@@ -158,9 +158,9 @@ def colour_bar(sheet: Any, axes: Any, scale: Scale, label: str) -> None:
     bar.ax.invert_yaxis()  # near is light, and on top
 
 
-def _resized(image: _Image, tall: int, wide: int) -> _Image:
-    """The picture at another size, by its nearest pixels."""
-    rows = ((np.arange(tall) + 0.5) * image.shape[0] / tall).astype(np.intp)
-    columns = ((np.arange(wide) + 0.5) * image.shape[1] / wide).astype(np.intp)
-    resized: _Image = image[rows][:, columns]
+def _resized(texels: _Floats, tall: int, wide: int) -> _Floats:
+    """The level at another size, by its nearest texels."""
+    rows = ((np.arange(tall) + 0.5) * texels.shape[0] / tall).astype(np.intp)
+    columns = ((np.arange(wide) + 0.5) * texels.shape[1] / wide).astype(np.intp)
+    resized: _Floats = texels[rows][:, columns]
     return resized

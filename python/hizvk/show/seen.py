@@ -67,7 +67,7 @@ class Seen(NamedTuple):
         tall, wide = (max(round(side * factor), 1) for side in view.size)
         rows = ((np.arange(tall) + 0.5) / factor).astype(np.intp).clip(max=view.size[0] - 1)
         columns = ((np.arange(wide) + 0.5) / factor).astype(np.intp).clip(max=view.size[1] - 1)
-        image = grey(self.depth)[rows][:, columns]
+        image = grey(self.depth[rows][:, columns])
         if self.bounds is not None and self.classes is not None:
             shapes = self.shapes(MOST_IN_PICTURE)
             lines, owners = outlines(view, shapes)
@@ -184,5 +184,5 @@ def _numbers(result: Any, classes: object) -> list[tuple[str, str]]:
     elif classes is None:
         rows.append(("in the list", f"{result.count:,}"))
     height, width = result._question.pyramid.size
-    rows.append(("depth image", f"{height} x {width} pixels"))
+    rows.append(("depth image", f"{height} x {width} px"))
     return rows

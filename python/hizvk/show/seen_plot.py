@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from ..view_depth import RayView
-from .colours import BACKGROUND, CLASS_COLOURS, FRUSTUM, INK, grey
+from .colours import BACKGROUND, CLASS_COLOURS, FRUSTUM, INK, grey, thinned
 from .lines import outlines
 from .shapes import HIDDEN, KEPT, OUTSIDE, box_edges
 
@@ -89,7 +89,7 @@ def plot(seen: Seen, up: str, most: int) -> Any:
 
 def _view(axis: Any, seen: Seen, shapes: Shapes) -> None:
     height, width = seen.camera.size
-    axis.imshow(grey(seen.depth), extent=(0, width, height, 0), interpolation="nearest")
+    axis.imshow(grey(thinned(seen.depth)), extent=(0, width, height, 0), interpolation="nearest")
     lines, owners = outlines(RayView(seen.camera), shapes)
     for one in (OUTSIDE, HIDDEN, KEPT):
         _draw(axis, lines[shapes.classes[owners] == one], one, width=1.0)

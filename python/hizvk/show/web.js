@@ -323,8 +323,15 @@ function drawAxes() {
 }
 
 let isAsked = false;
+let lastWhole = 0; // milliseconds
+let whole; // the timer of the next whole picture
+const SMOOTH = 50;
+// So few instances are always all drawn.
+const FEW = 1000;
 
-function draw() {
+// Draws every instance, or while the view moves one of `stride`.
+function draw(stride = 1) {
+  const began = performance.now();
   isAsked = false;
   clamp();
   view = axesOfView();
@@ -339,18 +346,25 @@ function draw() {
   // Kept instances come last, and so lie on top where outlines meet.
   for (const one of [2, 1, 0]) {
     if (!state.shown[one]) continue;
-    for (let i = 0; i < count; i++) if (classes[i] === one) drawInstance(i);
+    for (let i = 0; i < count; i += stride) if (classes[i] === one) drawInstance(i);
   }
   drawFrustum();
   context.putImageData(image, 0, 0);
   drawAxes();
-  document.body.dataset.drawn = 1 + Number(document.body.dataset.drawn || 0);
+  if (stride === 1) lastWhole = performance.now() - began;
 }
 
+// Draws soon; where a whole picture takes long, first a part of it, and the rest at rest.
 function ask() {
   if (isAsked) return;
   isAsked = true;
-  requestAnimationFrame(draw);
+  clearTimeout(whole);
+  const stride = count > FEW ? Math.ceil(lastWhole / SMOOTH) || 1 : 1;
+  requestAnimationFrame(() => {
+    draw(stride);
+    // Only now, for a hidden page may wait long for its next frame.
+    if (stride > 1) whole = setTimeout(draw, 250);
+  });
 }
 
 // -- mouse, touch, keys, address ------------------------------------------------------------------

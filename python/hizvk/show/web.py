@@ -24,6 +24,8 @@ from .seen_plot import up_of
 from .shapes import HIDDEN, KEPT, OUTSIDE
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy.typing as npt
 
     from ..bounds import Bounds
@@ -49,7 +51,7 @@ def page(
     result: Any,
     bounds: Bounds | None = None,
     *,
-    occluders: MeshLike | list[MeshLike] | None = None,
+    occluders: MeshLike | Sequence[MeshLike] | None = None,
     up: Up | None = None,
     most: int = 20_000,
     unit: str = "m",

@@ -98,7 +98,7 @@ def sweep(
         The N instances.
     cameras : sequence of Camera
         The V views.
-    occluders : Mesh, a mesh of trimesh or Open3D, or a sequence of meshes
+    occluders : Mesh, a mesh of trimesh, Open3D or PyVista, or a sequence of meshes
         What hides: every view renders its depth.
     depths : sequence of V arrays, or function
         Instead of `occluders`: the depth image of each view.

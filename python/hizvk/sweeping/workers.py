@@ -22,6 +22,7 @@ import numpy as np
 
 from .._processes import per_process
 from ..device import Device
+from ..oneline import default_device
 from ..options import Outputs
 from .spool import Reference
 
@@ -97,11 +98,13 @@ class _Place:
     def __init__(self) -> None:
         self.lock = threading.RLock()
         self.name = uuid.uuid4().hex
-        self.devices: dict[str | int | None, Device] = {}
+        self.devices: dict[str | int, Device] = {}
         self.scenes: OrderedDict[tuple[str, str | int | None], tuple[Instances, Occluders | None]]
         self.scenes = OrderedDict()
 
     def device(self, adapter: str | int | None) -> Device:
+        if adapter is None:
+            return default_device()
         if adapter not in self.devices:
             self.devices[adapter] = Device(adapter)
         return self.devices[adapter]
