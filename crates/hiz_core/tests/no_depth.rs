@@ -50,8 +50,6 @@ const fn way(footprint: Footprint, descent: u32, fit: Fit, pixels: u32) -> Way {
 /// A footprint of level 0, one of a stored level, and a descent from there to level 0.
 /// Then the same texel by texel for a volume's own fit.
 const WAYS: [Way; 14] = [
-    way(Footprint::One, 0, Fit::Rectangle, 1),
-    way(Footprint::One, 4096, Fit::Rectangle, 9),
     way(Footprint::Two, 0, Fit::Rectangle, 1),
     way(Footprint::Two, 0, Fit::Rectangle, 2),
     way(Footprint::Two, 0, Fit::Rectangle, 7),
@@ -64,6 +62,8 @@ const WAYS: [Way; 14] = [
     way(Footprint::Two, 4096, Fit::Volume, 2),
     way(Footprint::Eight, 0, Fit::Volume, 7),
     way(Footprint::Eight, 0, Fit::Volume, 10),
+    way(Footprint::One, 0, Fit::Rectangle, 1),
+    way(Footprint::One, 4096, Fit::Rectangle, 9),
 ];
 
 /// Flat boxes at depth 8, each `copies` times.
