@@ -73,7 +73,7 @@ impl LevelWay {
 enum Work {
     Fragment(FragmentLevels),
     Coarse { pipeline: wgpu::ComputePipeline, bindings: wgpu::BindGroup, level: wgpu::Buffer },
-    Pyramid { source: wgpu::TextureView, pyramid: Pyramid },
+    Pyramid { source: wgpu::TextureView, pyramid: Box<Pyramid> },
     Mips { source: wgpu::TextureView, mips: MipTexture },
 }
 
@@ -111,7 +111,7 @@ impl MethodLevels {
                     }
                     LevelWay::Pyramid(levels) => {
                         let options = PyramidOptions { levels, ..PyramidOptions::default() };
-                        let pyramid = engine.context().create_pyramid(size, &options)?;
+                        let pyramid = Box::new(engine.context().create_pyramid(size, &options)?);
                         Ok(Work::Pyramid { source: gpu.view(&texture)?, pyramid })
                     }
                     LevelWay::Mips => {
