@@ -220,7 +220,7 @@ class Browser:
                 "--host-resolver-rules=MAP * ~NOTFOUND",
                 "--proxy-server=127.0.0.1:9",
                 "--enable-logging=stderr",
-                "--virtual-time-budget=3000",
+                "--virtual-time-budget=1000",
                 f"--window-size={WINDOW[0]},{WINDOW[1]}",
                 "--hide-scrollbars",
                 *arguments,
