@@ -193,7 +193,7 @@ def test_the_comparison_and_the_pictures(tmp_path: Path) -> None:
         assert row.different == 0
         assert row.views == 2
         assert row.visited > 0
-        assert len(row.times()) == 8
+        assert len(row.times()) == 7
         assert len(row.counts()) == 10
     pytest.importorskip("matplotlib", reason="pictures need matplotlib (the extra viz)")
     paths = draw(building(20_000, 1), tmp_path)
