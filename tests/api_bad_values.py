@@ -2324,7 +2324,7 @@ TABLES |= {
         lambda _: (hizvk.HierarchicalVisibility, {"meshes": [TETRAHEDRON]}),
         {
             "meshes": [
-                (None, TypeError, "expected a Mesh, a mesh of trimesh or Open3D, or a list"),
+                (None, TypeError, "a mesh of trimesh, Open3D or PyVista, or a list"),
                 ([(np.zeros((3, 2)), [[0, 1, 2]])], ValueError, "got (3, 2) float64"),
                 ([TETRAHEDRON, 3], TypeError, "got int 3"),
             ],

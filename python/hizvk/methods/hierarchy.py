@@ -175,7 +175,7 @@ class HierarchicalVisibility:
 
     Parameters
     ----------
-    meshes : Mesh, a mesh of trimesh or Open3D, or a list of them
+    meshes : Mesh, a mesh of trimesh, Open3D or PyVista, or a list of them
         A list may also hold tuples as `Device.occluders` takes them.
     threshold : int
         A node of more meshlets is split; at least 1.
