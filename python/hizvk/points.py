@@ -40,6 +40,10 @@ __all__ = ["PointColours", "colour_points", "depth_from_points"]
 _MASK: Final = Outputs(mask=True, verdicts=False, indices=False, draws=False)
 
 
+#: How an array becomes points, for messages.
+_WAY_TO_POINTS: Final = "; an array of positions becomes hizvk.Points(array)"
+
+
 class PointColours(NamedTuple):
     """The colours of points; made by `colour_points`."""
 
@@ -53,7 +57,10 @@ class PointColours(NamedTuple):
     """``(N,)`` float32: the sum of the weights."""
 
     def bytes(self) -> npt.NDArray[np.uint8]:
-        """``(N, 3)`` uint8: the colours of images of 0 to 255, rounded."""
+        """``(N, 3)`` uint8: the colours of images of 0 to 255, rounded.
+
+        Of images of 0 to 1, it is ``numpy.rint(255 * seen.colours)`` instead.
+        """
         return np.clip(np.rint(self.colours), 0.0, 255.0).astype(np.uint8)
 
 
@@ -126,7 +133,7 @@ def colour_points(
     >>> seen.counts.tolist(), seen.bytes().tolist()
     ([1, 0], [[200, 0, 0], [0, 0, 0]])
     """
-    points = _arguments.instance("points", points, Points, "Points")
+    points = _arguments.instance("points", points, Points, "Points", _WAY_TO_POINTS)
     sampling = _arguments.choice("sampling", sampling, words(Sampling))  # type: ignore[assignment]
     weight = _arguments.choice("weight", weight, words(ColourWeight))  # type: ignore[assignment]
     options = cull_options(options, keywords)
@@ -176,12 +183,29 @@ def _view(
     array = np.asarray(image)
     if array.dtype.kind not in "uf" or (array.dtype.kind == "u" and array.dtype.itemsize > 1):
         got = _arguments.describe(image)
-        raise TypeError(f"views: expected uint8 or float images {expected}, got {got}")
+        hint = "; pass image / 257.0, which is 0 to 255" if array.dtype == np.uint16 else ""
+        raise TypeError(f"views: expected uint8 or float images {expected}, got {got}{hint}")
     if array.shape != expected:
-        got = _arguments.describe(image)
-        raise ValueError(f"views: expected images {expected} (the camera's size), got {got}")
+        got, hint = _arguments.describe(image), _way_to_colours(array.shape, camera)
+        raise ValueError(f"views: expected images {expected} (the camera's size), got {got}{hint}")
     wanted = np.uint8 if array.dtype.kind == "u" else np.float32
     return camera, depth, np.require(array, wanted, ["C", "A"])
+
+
+def _way_to_colours(sides: tuple[int, ...], camera: Camera) -> str:
+    """How an image of another shape becomes one of three colours and the camera's size."""
+    if sides == camera.size:
+        return "; of a grey image pass numpy.stack([image] * 3, axis=-1)"
+    if sides == (*camera.size, 1):
+        return "; of a grey image pass numpy.repeat(image, 3, axis=2)"
+    if sides == (*camera.size, 4):
+        return "; without alpha it is image[..., :3]"
+    if len(sides) == 3 and sides[2] == 3:
+        return (
+            "; resize the photograph to the camera's size, or pass camera.resized(image.shape[:2]) "
+            "and depth of that size"
+        )
+    return ""
 
 
 def depth_from_points(
@@ -228,7 +252,7 @@ def depth_from_points(
     >>> int((image > 0).sum()), float(image.max())
     (5, 0.25)
     """
-    points = _arguments.instance("points", points, Points, "Points")
+    points = _arguments.instance("points", points, Points, "Points", _WAY_TO_POINTS)
     camera = _arguments.instance("camera", camera, Camera, "a Camera")
     radius = _arguments.number("radius", radius, at_least=0.0)
     radius_px = _arguments.number("radius_px", radius_px, at_least=0.0, at_most=1024.0)
