@@ -29,6 +29,11 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 # Defaults are shown as they are written (`2**-23`), not as values.
 autodoc_preserve_defaults = True
+# Types of parameters are prose, such as "a sequence of meshes".
+# As fields of their own, their words would be links to whatever attribute has such a name.
+napoleon_use_param = False
+napoleon_use_rtype = False
+napoleon_use_keyword = False
 myst_heading_anchors = 3
 
 #: Documents beside this folder that are pages here, under their name in lower case.

@@ -4,6 +4,7 @@ Each function has a table: valid arguments, and for each parameter bad values wi
 a part of its text.
 """
 
+import atexit
 import os
 import tempfile
 from collections.abc import Callable
@@ -266,7 +267,7 @@ SAMPLING: list[Bad] = [
     (1, TypeError, "got int 1"),
 ]
 POINTS: list[Bad] = [
-    (np.zeros((2, 3)), TypeError, "expected Points, got (2, 3) float64"),
+    (np.zeros((2, 3)), TypeError, "expected Points, as hizvk.Points(xyz) makes them, got (2, 3)"),
     (None, TypeError, "got None"),
 ]
 RADIUS: list[Bad] = [
@@ -1004,7 +1005,18 @@ TABLES: dict[str, Table] = {
                 (
                     [(camera(), np.ones((6, 8)), np.zeros((8, 6, 3), np.uint8))],
                     ValueError,
-                    "expected images (6, 8, 3) (the camera's size), got (8, 6, 3) uint8",
+                    "expected images (6, 8, 3) (the camera's size), got (8, 6, 3) uint8; an image "
+                    "of another size goes with camera.resized",
+                ),
+                (
+                    [(camera(), np.ones((6, 8)), np.zeros((6, 8, 4), np.uint8))],
+                    ValueError,
+                    "got (6, 8, 4) uint8; without the alpha it is image[..., :3]",
+                ),
+                (
+                    [(camera(), np.ones((6, 8)), np.zeros((6, 8), np.uint8))],
+                    ValueError,
+                    "got (6, 8) uint8; a grey one goes as np.dstack([image] * 3)",
                 ),
             ],
             "kind": KIND,
@@ -1327,9 +1339,9 @@ TABLES: dict[str, Table] = {
             "occluders": [(TETRAHEDRON, TypeError, "expected Occluders of Device.occluders")],
             "leaf": [(0, ValueError, "got int 0"), (0.5, TypeError, "got float 0.5")],
             "most_parts": [
-                (0.5, ValueError, "got 0.5"),
+                (0.5, ValueError, "got float 0.5"),
                 ("all", TypeError, "got str 'all'"),
-                (NAN, ValueError, "got nan"),
+                (NAN, ValueError, "got float nan"),
             ],
         },
     ),
@@ -2084,6 +2096,9 @@ def swept() -> hizvk.Sweep:
     return hizvk.sweep(spheres(), [camera()], depths=[depth], kind="z")
 
 
+#: It is removed when the interpreter ends.
+FOLDER = tempfile.TemporaryDirectory()
+atexit.register(FOLDER.cleanup)
 FACES: list[Bad] = [
     ("sides", ValueError, 'expected one of "none", "back", "front", got str'),
     (None, TypeError, "got None"),
@@ -2191,7 +2206,7 @@ TABLES |= {
     "Sweep.union": Table(lambda _: (swept().union, {}), {}),
     "Sweep.csr": Table(lambda _: (swept().csr, {}), {"scipy": FLAG}),
     "Sweep.save": Table(
-        lambda _: (swept().save, {"path": Path(tempfile.gettempdir()) / "hizvk-test.npz"}),
+        lambda _: (swept().save, {"path": Path(FOLDER.name) / "sweep.npz"}),
         {"path": [(3, TypeError, "expected a path, got int 3"), (None, TypeError, "got None")]},
     ),
     "Sweep.load": Table(
@@ -2291,7 +2306,7 @@ TABLES |= {
 
 
 def saved_sweep() -> str:
-    path = Path(tempfile.gettempdir()) / "hizvk-test.npz"
+    path = Path(FOLDER.name) / "sweep.npz"
     swept().save(path)
     return str(path)
 
@@ -2309,7 +2324,7 @@ TABLES |= {
         lambda _: (hizvk.HierarchicalVisibility, {"meshes": [TETRAHEDRON]}),
         {
             "meshes": [
-                (None, TypeError, "expected a Mesh, a mesh of trimesh or Open3D, or a list"),
+                (None, TypeError, "a mesh of trimesh, Open3D or PyVista, or a list"),
                 ([(np.zeros((3, 2)), [[0, 1, 2]])], ValueError, "got (3, 2) float64"),
                 ([TETRAHEDRON, 3], TypeError, "got int 3"),
             ],

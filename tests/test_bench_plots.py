@@ -238,7 +238,8 @@ def measured(sizes: int) -> figures.Found:
     return found
 
 
-@pytest.mark.parametrize("sizes", [pytest.param(1, marks=pytest.mark.slow), 5])
+@pytest.mark.slow
+@pytest.mark.parametrize("sizes", [1, 5])
 def test_panels_of_the_speed_tool(sizes: int) -> None:
     figure = speed_plots.figure_of(measured(sizes))
     figure.draw_without_rendering()

@@ -12,6 +12,7 @@ import importlib
 import io
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -143,3 +144,24 @@ def test_commands_that_are_shown_exist() -> None:
     ):
         # Modules of hiz_core are named by their file alone.
         assert any(each.endswith(path) for each in tracked), path
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    """A dead link is one; the search knows words of every page."""
+    for module in ("sphinx", "furo", "myst_parser"):
+        pytest.importorskip(module, reason="make docs installs it")
+    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "-q", "-b", "html"]
+    run = subprocess.run(
+        [*command, str(ROOT / "docs"), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "search.html").exists()
+    index = (tmp_path / "searchindex.js").read_text(encoding="utf-8")
+    for page in [*ROOT.glob("docs/*.md"), *ROOT.glob("docs/jobs/*.md")]:
+        name = page.relative_to(ROOT / "docs").with_suffix("").as_posix()
+        assert f'"{name}"' in index, name

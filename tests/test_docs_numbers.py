@@ -115,6 +115,7 @@ def test_few_and_many_bounds_are_still_kept_so() -> None:
     assert {(row["rasteriser"], row["bounds"]): row["kept"] for row in shown} == ours
 
 
+@pytest.mark.slow
 def test_the_texts_still_lose_so(tmp_path: Path) -> None:
     """If this is red, run ``hizvk bench --texts`` and put its table into docs/methods.md."""
     methods = page("methods.md")

@@ -23,7 +23,7 @@ OUTPUTS = {
     "test result: FAILED. 4 passed; 2 failed; 0 ignored\n",
     "Python tests": "....\n======= 5 passed, 1 skipped in 2.00s =======\n",
     "speed": "  reduction  1.2 x\n3 of 4 targets met\nlook at  out\n",
-    "demo": "view 1 of 2\n0 of 14,619 visible instances culled\nlook at  out\n",
+    "demo": "culled   1 of 2\ncheck    passed: 0 of 9 visible instances culled\nlook at  out\n",
 }
 
 
@@ -110,7 +110,7 @@ def test_every_part_runs_on_the_adapter_and_is_reported(
         "| Rust tests | passed | 1 | 7 passed, 2 failed |",
         "| Python tests | passed | 1 | 5 passed, 1 skipped in 2.00s |",
         "| speed | passed | 1 | 3 of 4 targets met |",
-        "| demo | passed | 1 | 0 of 14,619 visible instances culled |",
+        "| demo | passed | 1 | passed: 0 of 9 visible instances culled |",
     ]
     assert "software" not in page
     assert "## Speed\n\n![times](speed/scale.png)\n\n### Cull" in page

@@ -7,6 +7,7 @@ within functions.
 from __future__ import annotations
 
 import ast
+import functools
 import subprocess
 import sys
 from pathlib import Path
@@ -50,6 +51,12 @@ def graph(root: Path) -> dict[str, set[str]]:
     return edges
 
 
+@functools.cache
+def package() -> dict[str, set[str]]:
+    """The graph of the package."""
+    return graph(PYTHON)
+
+
 def circles(edges: dict[str, set[str]]) -> list[list[str]]:
     """The groups of modules that import one another (Tarjan 1972), each sorted."""
     number: dict[str, int] = {}
@@ -78,7 +85,7 @@ def circles(edges: dict[str, set[str]]) -> list[list[str]]:
 
 
 def test_no_circle_of_modules() -> None:
-    edges = graph(PYTHON)
+    edges = package()
     assert len(edges) > 40
     assert circles(edges) == []
 
@@ -150,7 +157,7 @@ def test_nothing_uses_the_methods() -> None:
     """
     users = {
         name
-        for name, imported in graph(PYTHON).items()
+        for name, imported in package().items()
         if not name.startswith(("hizvk.methods", "hizvk.bench"))
         and any(module.startswith("hizvk.methods") for module in imported)
     }

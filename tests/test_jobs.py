@@ -104,6 +104,19 @@ def test_the_gallery_has_a_command_for_each_picture() -> None:
     assert jobs == {f"job_{name}" for name in drawn} | {"job_renderer"}
 
 
+def test_the_list_of_examples_is_whole() -> None:
+    """Each script with the first line of its text; if this is red, write it into the list."""
+    text = (ROOT / "examples" / "README.md").read_text(encoding="utf-8")
+    listed = dict(re.findall(r"^- \[(.+?)\]\(\1\): (.+(?:\n  .+)*)", text, re.MULTILINE))
+    files = {path.name: path for path in (ROOT / "examples").glob("*.*") if path.suffix != ".md"}
+    assert sorted(listed) == sorted(files)
+    for name, path in files.items():
+        if path.suffix == ".py":
+            about = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+            assert about is not None
+            assert " ".join(listed[name].split()).startswith(about.splitlines()[0]), name
+
+
 JOBS = ("driving", "points", "models", "renderer", "class")
 
 
@@ -140,6 +153,7 @@ def is_comparable(name: str) -> bool:
 def test_the_page_of_boxes_has_todays_counts() -> None:
     """If this is red, run ``python -m tools.jobs driving --write``."""
     rows = documented.table(page("jobs/driving.md"), "way", "missed")
+    pytest.importorskip("numba", reason="one of the ways needs it")
     found = driving.accuracy(hizvk.Device())
     assert [row[0] for row in found] == [row["way"] for row in rows]
     # Nothing that shows is lost, on any driver; ways of the host are the same everywhere.

@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 #: The pages of the site.
 DOCS = sorted([*ROOT.glob("docs/*.md"), *ROOT.glob("docs/jobs/*.md")])
 PAGES = sorted([*ROOT.glob("*.md"), *DOCS, *ROOT.glob("crates/*/README.md")])
+PAGES.append(ROOT / "examples" / "README.md")
 FENCE = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")

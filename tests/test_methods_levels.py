@@ -17,7 +17,7 @@ from hizvk.methods import MethodLevels, turitzin
 from hizvk.methods.levels import SHAPES
 
 if TYPE_CHECKING:
-    from hizvk.methods.levels import LevelWay
+    from hizvk.methods.levels import _LevelWay
 
 Array: TypeAlias = npt.NDArray[Any]
 
@@ -39,7 +39,7 @@ def level_4(image: Array) -> Array:
 
 
 def made(
-    device: hizvk.Device, way: LevelWay, images: list[Array], k: int, **more: Any
+    device: hizvk.Device, way: _LevelWay, images: list[Array], k: int, **more: Any
 ) -> list[Array]:
     levels = MethodLevels(device, way, images, **more)
     levels.run()

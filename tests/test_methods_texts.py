@@ -21,7 +21,7 @@ from hizvk.measuring.spread import Spread
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hizvk.methods.texts import Text
+    from hizvk.methods.texts import _Text
 
 Array: TypeAlias = npt.NDArray[Any]
 NEAR = 0.125
@@ -36,7 +36,7 @@ def view(size: tuple[int, int], borders: tuple[float, float, float, float]) -> h
 
 
 def kept(
-    device: hizvk.Device, text: Text, bounds: Any, camera: hizvk.Camera, depth: Array
+    device: hizvk.Device, text: _Text, bounds: Any, camera: hizvk.Camera, depth: Array
 ) -> Array:
     """What a published test keeps before this view depth."""
     test = hizvk.PublishedTest(
@@ -160,7 +160,7 @@ def random_scene(seed: int, count: int) -> tuple[Array, Array, Array]:
 
 
 @pytest.mark.parametrize("text", ["rakos", "one_lookup", "arm", "darnell"])
-def test_each_test_is_its_formula(device: hizvk.Device, text: Text) -> None:
+def test_each_test_is_its_formula(device: hizvk.Device, text: _Text) -> None:
     """The device works in float32, so one in a hundred may differ by a rounding."""
     depth, centers, radii = random_scene(5, 1500)
     tangent = 0.5

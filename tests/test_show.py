@@ -14,6 +14,7 @@ import re
 import subprocess
 import sys
 from base64 import b64decode
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -205,6 +206,14 @@ def test_a_result_shows_red_and_white_boxes(device: hizvk.Device) -> None:
         assert re.search(rf"{text}</td><td[^>]*>{count}</td>", page), text
 
 
+def test_a_notebook_shows_hints(device: hizvk.Device) -> None:
+    behind = hizvk.Boxes([(-1.0, -1, 5), (1, 1, 7)], [(0.0, 0, 6), (2, 2, 8)])
+    seen = culled(device, behind)
+    (hint,) = seen.hints()
+    assert f"Hint: {escape(hint)}" in seen._repr_html_()
+    assert "Hint" not in culled(device)._repr_html_()
+
+
 def test_results_without_verdicts(device: hizvk.Device) -> None:
     page = culled(device, outputs=["mask"])._repr_html_()
     assert re.search(r"kept</td><td[^>]*>1</td>", page)
@@ -280,7 +289,12 @@ def test_a_line_through_the_eye_plane_is_cut_off() -> None:
     lines, _ = outlines(RayView(camera()), shown)
     assert len(lines) == 8  # the four edges around the near end lie behind the eye
     assert np.isfinite(lines).all()
-    assert (np.abs(lines) <= 3 * 160).all()
+    # Edges along the view run towards the middle, and end five half images beside it.
+    along = lines[np.ptp(lines, axis=1).max(axis=1) > 100]
+    assert len(along) == 4
+    across, down = np.abs(along - (80, 45)).transpose(2, 0, 1)
+    np.testing.assert_allclose(across, down, rtol=1e-9)
+    np.testing.assert_allclose(down.max(axis=1), 5 * 45, rtol=1e-9)
 
 
 def test_a_sample_is_spread_and_keeps_small_classes() -> None:
@@ -335,6 +349,31 @@ def test_copies_are_equal_and_say_that_they_cannot_be_drawn(device: hizvk.Device
         assert other == told
         with pytest.raises(ValueError, match=r"has lost its pyramid.*CullResult\.explain"):
             other.plot()
+        assert other._repr_html_() is None  # a notebook shows its text
+        assert other._repr_png_() is None
+
+
+def test_what_a_lost_device_holds_shows_as_text(
+    device: hizvk.Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hiz = device.pyramid(wall(), camera(), kind="z")
+
+    def lost(*_: object, **__: object) -> None:
+        raise hizvk.DeviceLostError("the device is lost")
+
+    monkeypatch.setattr(hizvk.Pyramid, "level", lost)
+    assert hiz._repr_html_() is None
+    assert hiz._repr_png_() is None
+
+
+@needs_matplotlib
+def test_a_member_of_a_hidden_group_names_the_groups_test(device: hizvk.Device) -> None:
+    low = np.random.default_rng(5).uniform((-9, -1, -40), (-4, 1, -30), (2000, 3))
+    seen = culled(device, hizvk.Boxes(low, low + 0.1), hierarchy=True)
+    told = next(one for i in range(0, 2000, 100) if (one := seen.explain(i)).group is not None)
+    assert "its group of 64 was hidden as a whole" in texts(told.plot())
+    assert told.group is not None
+    assert "nearest depth of the instance: 3" in texts(told.group.plot())
 
 
 # -- figures ---------------------------------------------------------------------------------------

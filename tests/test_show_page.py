@@ -42,7 +42,7 @@ QUAD = hizvk.Mesh(
     [[-30, -30, -10.0], [0, -30, -10], [0, 30, -10], [-30, 30, -10]], [[0, 1, 2], [0, 2, 3]]
 )
 #: A wall hides the left half of the view, and so the boxes at the left.
-LEFT, RIGHT = np.array([(-x, y, -20) for x in (3, 5) for y in (-2, 2)]), (4, 0, -20)
+LEFT, RIGHT = np.array([(-x, y, -20) for x in (3, 5) for y in (-2, 2)]), (4, 3, -20)
 CENTERS = np.array([*LEFT, RIGHT, (60, 0, -20)], float)
 BOXES = hizvk.Boxes(CENTERS - 0.6, CENTERS + 0.6)
 
@@ -220,7 +220,7 @@ class Browser:
                 "--host-resolver-rules=MAP * ~NOTFOUND",
                 "--proxy-server=127.0.0.1:9",
                 "--enable-logging=stderr",
-                "--virtual-time-budget=3000",
+                "--virtual-time-budget=1000",
                 f"--window-size={WINDOW[0]},{WINDOW[1]}",
                 "--hide-scrollbars",
                 *arguments,
@@ -279,17 +279,18 @@ press("+"); tellState();
 drag("pointerdown", 100); drag("pointermove", 200); drag("pointerup", 200); tellState();
 canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: 100 })); tellState();
 
-// The number of pixels of about this colour, and the first and last of their columns.
+// The number of pixels of about this colour, the first and last of their columns, the last row.
 function look(colour) {
-  let [count, first, last] = [0, width, -1];
+  let [count, first, last, bottom] = [0, width, -1, -1];
   for (let at = 0; at < width * height; at++) {
     if (colour.every((one, k) => Math.abs(one - pixels[4 * at + k]) <= 8)) {
       count++;
       first = Math.min(first, at % width);
       last = Math.max(last, at % width);
+      bottom = Math.floor(at / width);
     }
   }
-  return [count, first, last];
+  return [count, first, last, bottom];
 }
 press("4"); press("c"); draw();
 told.size = [width, height];
@@ -332,12 +333,13 @@ def test_keys_mouse_and_pixels(browser: Browser, device: hizvk.Device, tmp_path:
     assert wide == CANVAS
     assert max(found["cut"]) <= 0  # no text is cut off
     focal = tall / 2 / np.tan(np.radians(30))
-    for (_, first, last), sides in (
+    for (_, first, last, _), sides in (
         (found["kept"], (3.4 / 20.6, 4.6 / 19.4)),
         (found["hidden"], (-5.6 / 19.4, -2.4 / 20.6)),
     ):
         expected = [wide / 2 + focal * side for side in sides]
         assert [first, last] == pytest.approx(expected, abs=2)
+    assert found["kept"][3] == pytest.approx(tall / 2 - focal * 2.4 / 20.6, abs=2)
     assert found["without"] == 0
     # The wall leaves a dim rest of what it hides, or without x-ray nothing.
     assert found["behind"][0] == 0

@@ -152,6 +152,32 @@ def test_no_instances_and_one_camera() -> None:
     assert (seen.bits.shape, seen.count, seen.union().shape) == ((1, 0), 0, (0,))
 
 
+class Workers(Executor):
+    """Workers that know the scene once they have seen it; calls go to any of them by `choose`."""
+
+    def __init__(self, count: int, choose: Callable[[int], int], sees: bool = False) -> None:
+        self.know = [False] * count
+        self.copies, self.ran, self.sent = 0, list[int](), set[str]()
+        self._choose, self._sees = choose, sees
+
+    def submit(self, fn: Any, /, task: Any, block: Block, scene: Any = None) -> Any:
+        worker = self._choose(len(self.know))
+        self.copies += scene is not None
+        self.sent |= {type(scene).__name__} if scene is not None else set()
+        self.know[worker] |= scene is not None
+        rows = None
+        if self.know[worker]:
+            self.ran.append(block.number)
+            rows = np.zeros((1, 1), np.uint8)
+        future: Future[Answer] = Future()
+        future.set_result(Answer(str(worker), block.number, rows, self._sees))
+        return future
+
+
+def pieces(count: int) -> list[Block]:
+    return [Block(number, range(number, number + 1), ()) for number in range(count)]
+
+
 # -- who runs the blocks ---------------------------------------------------------------------------
 
 
@@ -245,6 +271,38 @@ def test_a_cluster_that_sees_no_file(
     np.testing.assert_array_equal(seen.bits, packed(by_walls))
 
 
+class Engine:
+    """A client whose engine loses what it was given, the first few times."""
+
+    def __init__(self, losses: int) -> None:
+        self._losses = losses
+
+    def scatter(self, scene: Any, **_: Any) -> Any:
+        self._losses -= 1
+        return "lost" if self._losses >= 0 else scene
+
+
+@pytest.mark.parametrize("losses", [0, 1, 3, 100])
+def test_a_scene_that_the_engine_loses_is_given_again(losses: int) -> None:
+    class Losing(Workers):
+        def submit(self, fn: Any, /, task: Any, block: Block, *scene: Any) -> Any:
+            if scene == ("lost",):
+                future: Future[Answer] = Future()
+                future.cancel()
+                future.set_running_or_notify_cancel()
+                return future
+            return super().submit(fn, task, block, *scene)
+
+    job = handing.Job(Task("", hizvk.CullOptions()), "scene", Engine(losses))  # type: ignore[arg-type]
+    workers = Losing(1, lambda _: 0)
+    if losses == 100:
+        with pytest.raises(RuntimeError, match="the executor cancelled a block"):
+            list(handing.answers(workers, job, pieces(9)))
+        return
+    assert sorted(one.number for one in handing.answers(workers, job, pieces(9))) == list(range(9))
+    assert sorted(workers.ran) == list(range(9))
+
+
 def test_the_lines_for_a_cluster_run(
     client: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -272,32 +330,6 @@ def elsewhere(self: spool.Spool) -> spool.Spool:
 
 
 # -- how the scene travels -------------------------------------------------------------------------
-
-
-class Workers(Executor):
-    """Workers that know the scene once they have seen it; calls go to any of them by `choose`."""
-
-    def __init__(self, count: int, choose: Callable[[int], int], sees: bool = False) -> None:
-        self.know = [False] * count
-        self.copies, self.ran, self.sent = 0, list[int](), set[str]()
-        self._choose, self._sees = choose, sees
-
-    def submit(self, fn: Any, /, task: Any, block: Block, scene: Any = None) -> Any:
-        worker = self._choose(len(self.know))
-        self.copies += scene is not None
-        self.sent |= {type(scene).__name__} if scene is not None else set()
-        self.know[worker] |= scene is not None
-        rows = None
-        if self.know[worker]:
-            self.ran.append(block.number)
-            rows = np.zeros((1, 1), np.uint8)
-        future: Future[Answer] = Future()
-        future.set_result(Answer(str(worker), block.number, rows, self._sees))
-        return future
-
-
-def pieces(count: int) -> list[Block]:
-    return [Block(number, range(number, number + 1), ()) for number in range(count)]
 
 
 def handed(workers: Executor, count: int) -> list[int]:
@@ -374,6 +406,15 @@ def test_what_was_swept_otherwise_is_no_beginning(tmp_path: Path) -> None:
     for call in (seen.mask, seen.visible_from):
         with pytest.raises(IndexError, match=r"expected an integer in 0\.\."):
             call(5000)
+
+
+def test_what_is_uploaded_already_is_refused_with_the_way_out() -> None:
+    device = hizvk.Device()
+    walls: Any = device.occluders(WALLS)
+    crowd: Any = device.instances(BALLS)
+    for bounds, occluders, name in ((crowd, WALLS, "bounds"), (BALLS, walls, "occluders")):
+        with pytest.raises(TypeError, match=f"{name}: .*pass them as they were before the upload"):
+            hizvk.sweep(bounds, CAMERAS, occluders=occluders)
 
 
 @pytest.mark.parametrize("executor", [None, 1])

@@ -64,7 +64,6 @@ WAYS: list[tuple[Callable[[hizvk.Device], object], str]] = [
         lambda _: hizvk.visible(BALLS, CAMERA, depth=DEPTH, kind="z", tolerance=0.05),
         "pass hizvk.Tolerance(abs=0.05)",
     ),
-    (lambda _: hizvk.depth_from_points(np.zeros((2, 3)), CAMERA), "hizvk.Points(array)"),
     # Depth and photographs.
     (
         lambda _: hizvk.visible(BALLS, CAMERA, depth=np.ones((6, 8, 3)), kind="z"),
@@ -78,10 +77,6 @@ WAYS: list[tuple[Callable[[hizvk.Device], object], str]] = [
         lambda _: hizvk.visible(BALLS, CAMERA, depth=DEPTH, kind="z", invalid=0),
         "pass [0]",
     ),
-    (lambda _: colour(np.zeros((6, 8), np.uint8)), "numpy.stack([image] * 3, axis=-1)"),
-    (lambda _: colour(np.zeros((6, 8, 1), np.uint8)), "numpy.repeat(image, 3, axis=2)"),
-    (lambda _: colour(np.zeros((6, 8, 4), np.uint8)), "without alpha it is image[..., :3]"),
-    (lambda _: colour(np.zeros((12, 16, 3), np.uint8)), "resize the photograph"),
     (lambda _: colour(np.zeros((6, 8, 3), np.uint16)), "pass image / 257.0"),
     # Sweeps and pictures.
     (

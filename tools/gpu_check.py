@@ -125,7 +125,7 @@ def says(result: Result) -> str:
         "Rust tests": r"^Summary .*\] +(?P<said>.*)",
         "Python tests": r"(?P<said>.*\d+ (?:passed|failed).*)",
         "speed": r"(?P<said>\d+ of \d+ targets met.*)",
-        "demo": r"(?P<said>.*false culls?.*|.*visible.*culled.*)",
+        "demo": r"^check +(?P<said>.*)",
     }[result.part.name]
     found = [match["said"] for line in lines if (match := re.search(wanted, line))]
     said = found[-1] if found else (lines[-1] if lines else "nothing")

@@ -12,7 +12,7 @@ from ._types import CornerOrder, words
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    Floats = npt.NDArray[np.float64]
+    _Floats = npt.NDArray[np.float64]
 
 #: Where each corner lies along the box's own axes, by the order's name.
 #:
@@ -45,7 +45,7 @@ def hint(corners: Any) -> str:
     return "; of one box pass [corners]" if sides == (8, 3) else ""
 
 
-def boxes(corners: object, order: object) -> tuple[Floats, Floats, Floats]:
+def boxes(corners: object, order: object) -> tuple[_Floats, _Floats, _Floats]:
     """Centres, half sizes and rotations of boxes with these corners; what is no box is refused."""
     if not isinstance(order, str):
         raise TypeError(f"order: expected {ORDERS}, got {_arguments.describe(order)}")
@@ -69,7 +69,7 @@ def boxes(corners: object, order: object) -> tuple[Floats, Floats, Floats]:
     return centers, half_sizes, axes
 
 
-def _fitted(points: Floats, order: str) -> tuple[Floats, Floats, Floats, Floats]:
+def _fitted(points: _Floats, order: str) -> tuple[_Floats, _Floats, _Floats, _Floats]:
     """Centres, half sizes and axes ``(N, 3, 3)`` in columns, and how far a corner is off ``(N,)``.
 
     NaN, which no comparison finds too large, where a corner is not finite.
@@ -87,7 +87,7 @@ def _fitted(points: Floats, order: str) -> tuple[Floats, Floats, Floats, Floats]
     return centers, half_sizes, axes.swapaxes(1, 2), off
 
 
-def _orthonormal(edges: Floats) -> Floats:
+def _orthonormal(edges: _Floats) -> _Floats:
     """``(N, 3, 3)``: axes in rows along the edges, the longest ones first to count (Gram-Schmidt).
 
     Edges without a length get an axis across the others.
@@ -108,13 +108,13 @@ def _orthonormal(edges: Floats) -> Floats:
     return found
 
 
-def _beside(vectors: Floats, axis: Floats) -> Floats:
+def _beside(vectors: _Floats, axis: _Floats) -> _Floats:
     """What is left of vectors without their part along an axis of length 1."""
-    found: Floats = vectors - (vectors * axis).sum(axis=1, keepdims=True) * axis
+    found: _Floats = vectors - (vectors * axis).sum(axis=1, keepdims=True) * axis
     return found
 
 
-def _unit(vectors: Floats, otherwise: Floats, nothing: Floats | float) -> Floats:
+def _unit(vectors: _Floats, otherwise: _Floats, nothing: _Floats | float) -> _Floats:
     """The directions of vectors; `otherwise` for those that are no longer than `nothing`."""
     largest = np.abs(vectors).max(axis=1, keepdims=True)
     scaled = vectors / largest  # so that no square underflows

@@ -118,6 +118,9 @@ class Explanation(PicturedExplanation):
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "_pyramid"}
 
+    def _is_drawable(self) -> bool:
+        return self._pyramid is not None
+
     def _explained(self, unit: str) -> Explained:
         if self._pyramid is None:
             raise ValueError(

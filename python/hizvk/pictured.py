@@ -41,18 +41,22 @@ class _Shown:
         """What has the methods ``picture`` and ``html``."""
         raise NotImplementedError
 
+    def _is_drawable(self) -> bool:
+        """Whether there is what a picture reads."""
+        return True
+
     def _repr_png_(self) -> bytes | None:
-        return _unless_lost(lambda: self._picture().picture())  # type: ignore[no-any-return]
+        return self._unless_lost(lambda: self._picture().picture())  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str | None:
-        return _unless_lost(lambda: self._picture().html())  # type: ignore[no-any-return]
+        return self._unless_lost(lambda: self._picture().html())  # type: ignore[no-any-return]
 
-
-def _unless_lost(make: Callable[[], Any]) -> Any:
-    try:
-        return make()
-    except HizError:
-        return None  # the notebook falls back to `repr`
+    def _unless_lost(self, make: Callable[[], Any]) -> Any:
+        """What `make` returns, or None, for which a notebook falls back to `repr`."""
+        try:
+            return make() if self._is_drawable() else None
+        except HizError:
+            return None
 
 
 def _levels(thing: Any, kind: DepthKind | None, unit: str, levels: dict[int, _Read]) -> Levels:

@@ -36,12 +36,10 @@ if TYPE_CHECKING:
 __all__ = ["PointColours", "colour_points", "depth_from_points"]
 
 
+#: What `points` takes.
+_A_CLOUD: Final = "Points, as hizvk.Points(xyz) makes them"
 #: What a cull makes here.
 _MASK: Final = Outputs(mask=True, verdicts=False, indices=False, draws=False)
-
-
-#: How an array becomes points, for messages.
-_WAY_TO_POINTS: Final = "; an array of positions becomes hizvk.Points(array)"
 
 
 class PointColours(NamedTuple):
@@ -133,7 +131,7 @@ def colour_points(
     >>> seen.counts.tolist(), seen.bytes().tolist()
     ([1, 0], [[200, 0, 0], [0, 0, 0]])
     """
-    points = _arguments.instance("points", points, Points, "Points", _WAY_TO_POINTS)
+    points = _arguments.instance("points", points, Points, _A_CLOUD)
     sampling = _arguments.choice("sampling", sampling, words(Sampling))  # type: ignore[assignment]
     weight = _arguments.choice("weight", weight, words(ColourWeight))  # type: ignore[assignment]
     options = cull_options(options, keywords)
@@ -169,6 +167,17 @@ def colour_points(
     return PointColours(mean, counts, weights)
 
 
+def _other_shape(image: npt.NDArray[Any], size: tuple[int, int]) -> str:
+    """What to do about an image of another shape; empty where that is not clear."""
+    if image.shape in (size, (*size, 1)):
+        return "; a grey one goes as np.dstack([image] * 3)"
+    if image.shape == (*size, 4):
+        return "; without the alpha it is image[..., :3]"
+    if image.ndim == 3 and image.shape[2] == 3:
+        return "; an image of another size goes with camera.resized and a depth image of that size"
+    return ""
+
+
 def _view(
     view: object,
 ) -> tuple[Camera, npt.ArrayLike | DepthImage, npt.NDArray[Any]]:
@@ -186,26 +195,13 @@ def _view(
         hint = "; pass image / 257.0, which is 0 to 255" if array.dtype == np.uint16 else ""
         raise TypeError(f"views: expected uint8 or float images {expected}, got {got}{hint}")
     if array.shape != expected:
-        got, hint = _arguments.describe(image), _way_to_colours(array.shape, camera)
-        raise ValueError(f"views: expected images {expected} (the camera's size), got {got}{hint}")
+        got = _arguments.describe(image)
+        raise ValueError(
+            f"views: expected images {expected} (the camera's size), got {got}"
+            + _other_shape(array, camera.size)
+        )
     wanted = np.uint8 if array.dtype.kind == "u" else np.float32
     return camera, depth, np.require(array, wanted, ["C", "A"])
-
-
-def _way_to_colours(sides: tuple[int, ...], camera: Camera) -> str:
-    """How an image of another shape becomes one of three colours and the camera's size."""
-    if sides == camera.size:
-        return "; of a grey image pass numpy.stack([image] * 3, axis=-1)"
-    if sides == (*camera.size, 1):
-        return "; of a grey image pass numpy.repeat(image, 3, axis=2)"
-    if sides == (*camera.size, 4):
-        return "; without alpha it is image[..., :3]"
-    if len(sides) == 3 and sides[2] == 3:
-        return (
-            "; resize the photograph to the camera's size, or pass camera.resized(image.shape[:2]) "
-            "and depth of that size"
-        )
-    return ""
 
 
 def depth_from_points(
@@ -252,7 +248,7 @@ def depth_from_points(
     >>> int((image > 0).sum()), float(image.max())
     (5, 0.25)
     """
-    points = _arguments.instance("points", points, Points, "Points", _WAY_TO_POINTS)
+    points = _arguments.instance("points", points, Points, _A_CLOUD)
     camera = _arguments.instance("camera", camera, Camera, "a Camera")
     radius = _arguments.number("radius", radius, at_least=0.0)
     radius_px = _arguments.number("radius_px", radius_px, at_least=0.0, at_most=1024.0)

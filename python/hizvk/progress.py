@@ -111,6 +111,8 @@ class Progress:
     def step(self, doing: str = "", count: int = 1) -> None:
         """Counts steps as done; `doing` is the next one."""
         self.done += count
+        if self.total is not None:
+            self.total = max(self.total, self.done)  # it may have been an estimate
         self.doing = doing
         if self._call is not None:
             self._call(self.done, self.total)
@@ -283,6 +285,7 @@ class _Notebook:
         self._renew(of.bar())
 
     def end(self, of: Progress) -> None:
+        of.doing = ""
         self._renew(of.text())
 
     def _renew(self, line: str) -> None:
@@ -293,12 +296,13 @@ class _Notebook:
             self._handle.update(shown, raw=True)
 
 
-def check_progress(progress: object) -> Callable[[int, int | None], object] | None:
+def check_progress(progress: Any) -> Callable[[int, int | None], object] | None:
     """The caller's function; None for True, False and None; a `TypeError` for anything else."""
     if progress is None or isinstance(progress, (bool, np.bool_)):
         return None
     if callable(progress):
-        return progress
+        call: Callable[[int, int | None], object] = progress
+        return call
     from . import _arguments
 
     got = _arguments.describe(progress)

@@ -25,7 +25,7 @@ def main() -> int:
     pictures = commands.add_parser("pictures", help="the text's figures as PNG files")
     pictures.add_argument("folder", type=Path)
     pictures.add_argument("--scene", choices=list(SCENES), default="building")
-    pictures.add_argument("--millions", type=float, default=0.3)
+    pictures.add_argument("--millions", type=float, default=1.0)
     arguments = parser.parse_args()
     if arguments.command == "compare":
         return print_tables(
@@ -36,7 +36,7 @@ def main() -> int:
             rounds=arguments.rounds,
             threshold=arguments.threshold,
         )
-    made = SCENES[arguments.scene](round(arguments.millions * 1e6), 1)
+    made = SCENES[arguments.scene](round(arguments.millions * 1e6), 6)
     for path in draw(made, arguments.folder):
         print(path)
     return 0

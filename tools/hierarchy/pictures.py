@@ -96,7 +96,7 @@ def cells_of_test(frame: HierarchyFrame, extent: Extent) -> list[Cell]:
 
 
 def draw(made: Crowded, folder: Path) -> list[Path]:
-    """Draws one frame of the first view; returns the files: three PNGs.
+    """Draws the frame with the most hidden nodes; returns the files: three PNGs.
 
     Raises
     ------
@@ -106,9 +106,9 @@ def draw(made: Crowded, folder: Path) -> list[Path]:
     if not figures.can_draw():
         raise SystemExit(f"left out: {figures.missing()}")
     folder.mkdir(parents=True, exist_ok=True)
-    view = made.views[0]
     scene = hizvk.HierarchicalVisibility(made.meshes)
-    frame = scene.render(view.camera(SIZE))
+    frames = [(scene.render(view.camera(SIZE)), view) for view in made.views]
+    frame, view = max(frames, key=lambda each: each[0].nodes_hidden)
     paths = [folder / f"{name}.png" for name in ("octree", "pyramid", "quadtree")]
     _octree(scene, frame, view, paths[0])
     _pyramid(frame, view, paths[1])
@@ -130,9 +130,9 @@ def _octree(
     leaf[frame.visible_leaves] = True
     groups = (
         (frame.states == OUTSIDE, "outside of the view", GREY, "none"),
-        (frame.states == HIDDEN, "hidden, with all below", RED, "none"),
         ((frame.states == VISIBLE) & ~leaf, "visited", PALE, "none"),
         (leaf, "visible leaves", GREEN, GREEN + "60"),
+        (frame.states == HIDDEN, "hidden, with all below", RED, "none"),
     )
     figure = figures.sheet(8.0, 8.0, dpi=110)
     axes = figure.add_subplot()

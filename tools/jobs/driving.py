@@ -158,8 +158,8 @@ def ways(device: hizvk.Device, of: Frame) -> dict[str, Callable[[], Floats]]:
         seen = device.cull(resident, of.camera, pyramid, exactly, ["pixels"])
         return seen.visible_fraction(objects_in_depth=of.is_shown)
 
-    def mask() -> Floats:
-        return device.cull(resident, of.camera, pyramid, options, ["mask"]).mask.astype(float)
+    def mask(how: hizvk.CullOptions) -> Floats:
+        return device.cull(resident, of.camera, pyramid, how, ["mask"]).mask.astype(float)
 
     found: dict[str, Callable[[], Floats]] = {
         "corners, NumPy": lambda: by_corners(of),
@@ -181,7 +181,8 @@ def ways(device: hizvk.Device, of: Frame) -> dict[str, Callable[[], Floats]]:
     return found | {
         "hizvk, one call with uploads": call,
         "hizvk, counts of what is uploaded": counts,
-        "hizvk, mask alone": mask,
+        "hizvk, mask by every pixel": lambda: mask(exactly),
+        "hizvk, mask by 2x2 texels": lambda: mask(options),
     }
 
 

@@ -69,7 +69,8 @@ def figure_of(scene: SceneResult) -> Any:
     rows = [(number, row) for number, row in enumerate(scene.rows, 1) if row.total_ms is not None]
     figure = figures.sheet(14.0, 6.4)
     left, right = figure.subplots(1, 2, sharey=True)
-    # The rows of hizvk set the lower end. Rays, which keep far less, stand on it.
+    # The rows of hizvk set the lower end.
+    # Rays, which keep far less, stand on it.
     lowest = min(_error(row) for _, row in rows if row.configuration is not None)
     high = limits(_error(row) for _, row in rows if _error(row) >= lowest)[1]
     margin = 0.08 * (high - lowest) + 0.05

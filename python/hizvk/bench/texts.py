@@ -99,7 +99,8 @@ def _ways(
     ways: dict[str, Any] = {}
     for text, (label, kind, size) in TEXTS.items():
         seen = pyramid if size is None else plain[size]
-        test = hizvk.PublishedTest(device, text, bounds[kind], seen.camera, seen)  # type: ignore[arg-type]
+        given = bounds[kind], seen.camera, seen
+        test = hizvk.PublishedTest(device, text, *given)  # type: ignore[arg-type]
         ways[label] = lambda test=test: of_text(test)
     ways[LOW_RESOLUTION] = lambda: of_ours(Configuration(), plain[SMALL])
     for label, configuration in OURS.items():

@@ -53,7 +53,7 @@ def limits(values: Iterable[float], *, is_log: bool = False) -> tuple[float, flo
     """The ends of an axis for most of the values.
 
     Up to three values at each end are left out, if without them the axis spans much less.
-    Who draws them puts them on the edge, with an arrow.
+    The caller draws those on the edge, with an arrow.
 
     Parameters
     ----------

@@ -175,7 +175,7 @@ class HierarchicalVisibility:
 
     Parameters
     ----------
-    meshes : Mesh, a mesh of trimesh or Open3D, or a list of them
+    meshes : Mesh, a mesh of trimesh, Open3D or PyVista, or a list of them
         A list may also hold tuples as `Device.occluders` takes them.
     threshold : int
         A node of more meshlets is split; at least 1.
@@ -192,16 +192,19 @@ class HierarchicalVisibility:
     Examples
     --------
     >>> import hizvk
-    >>> square = [[-50, -50, 0], [50, -50, 0], [-50, 50, 0], [50, 50, 0]]
-    >>> places = [[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, z], [0, 0, 0, 1]] for z in (-10.0, -20.0)]
-    >>> walls = hizvk.Mesh(np.array(square, float), [[0, 1, 2], [2, 1, 3]], places)
-    >>> scene = hizvk.HierarchicalVisibility(walls, threshold=1)
+    >>> import numpy as np
+    >>> corners = [[-20.0, -20, -10], [20, -20, -10], [-20, 20, -10], [20, 20, -10]]
+    >>> wall = hizvk.Mesh(corners, [[0, 1, 2], [2, 1, 3]])
+    >>> places = np.tile(np.eye(4), (16, 1, 1))
+    >>> places[:, 0, 3], places[:, 2, 3] = np.arange(-8, 8), -30.0  # in a row behind the wall
+    >>> flags = hizvk.Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], places)
+    >>> scene = hizvk.HierarchicalVisibility([wall, flags], threshold=1)
     >>> camera = hizvk.Camera.look_at(
     ...     (0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(48, 64), near=0.1
     ... )
     >>> frame = scene.render(camera)
     >>> frame.triangles_drawn, frame.triangles_in_hidden_nodes
-    (2, 2)
+    (2, 16)
     >>> scene.render(camera, previous=frame).triangles_drawn
     2
     """

@@ -5,11 +5,12 @@ Source: Mike Turitzin, *Hierarchical Depth Buffers*, 2020.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
 
 from .. import _arguments, _core
+from .._types import words
 from ..camera import Camera
 from ..device import Device
 
@@ -18,10 +19,12 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-__all__ = ["SHAPES", "LevelWay", "MethodLevels"]
+__all__ = ["SHAPES", "MethodLevels"]
 
 #: How the levels are made.
-LevelWay: TypeAlias = Literal["fragment", "atomic", "tree", "mips", "pyramid"]
+_LevelWay: TypeAlias = (
+    Literal["fragment"] | Literal["atomic"] | Literal["tree"] | Literal["mips"] | Literal["pyramid"]
+)
 #: Width and height of the workgroups of atomic minima; each makes a texel of 16x16 pixels.
 SHAPES: Final = ((16, 16), (16, 8), (16, 4), (8, 8), (8, 4), (4, 4))
 
@@ -68,14 +71,14 @@ class MethodLevels:
     def __init__(
         self,
         device: Device,
-        way: LevelWay,
+        way: _LevelWay,
         images: Sequence[npt.NDArray[np.float32]],
         *,
         shape: tuple[int, int] = (16, 16),
         levels: tuple[int, int] = (1, 15),
     ) -> None:
         _arguments.instance("device", device, Device, "a Device")
-        _arguments.choice("way", way, get_args(LevelWay))
+        _arguments.choice("way", way, words(_LevelWay))
         if shape not in SHAPES:
             raise ValueError(f"shape: expected one of {SHAPES}, got {shape!r}")
         arrays = [

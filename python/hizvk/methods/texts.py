@@ -14,11 +14,12 @@ So what they lose is due to the test alone, and not to how their texts reduce de
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
 
 from .. import _arguments, _core
+from .._types import words
 from ..bounds import Boxes, Spheres
 from ..camera import Camera
 from ..device import Device
@@ -27,10 +28,10 @@ from ..resources import Pyramid
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-__all__ = ["PublishedTest", "Text"]
+__all__ = ["PublishedTest"]
 
 #: A published test, by its author.
-Text: TypeAlias = Literal["rakos", "arm", "darnell", "one_lookup"]
+_Text: TypeAlias = Literal["rakos"] | Literal["arm"] | Literal["darnell"] | Literal["one_lookup"]
 
 #: The bounds that each test takes.
 _TAKES: Final[dict[str, type[Boxes | Spheres]]] = {
@@ -89,10 +90,10 @@ class PublishedTest:
     uncertified = True
 
     def __init__(
-        self, device: Device, text: Text, bounds: Boxes | Spheres, camera: Camera, pyramid: Pyramid
+        self, device: Device, text: _Text, bounds: Boxes | Spheres, camera: Camera, pyramid: Pyramid
     ) -> None:
         _arguments.instance("device", device, Device, "a Device")
-        chosen = _arguments.choice("text", text, get_args(Text))
+        chosen = _arguments.choice("text", text, words(_Text))
         wanted = _TAKES[chosen]
         _arguments.instance("bounds", bounds, wanted, f"{wanted.__name__} for {chosen!r}")
         _arguments.instance("camera", camera, Camera, "a Camera")

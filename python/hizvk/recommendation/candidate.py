@@ -69,7 +69,7 @@ class Candidate:
     """How it culls, for `Device.cull`."""
     selection: OccluderSelection | None = field(default=None, repr=False, compare=False)
     """Which of the given meshes are its occluders; None: all of them."""
-    meshes: tuple[MeshLods, ...] | None = field(default=None, repr=False, compare=False)
+    mesh_lods: tuple[MeshLods, ...] | None = field(default=None, repr=False, compare=False)
     """The meshes for ``meshes=`` of `Device.cull`, if it has a rule for levels of detail."""
     triangles: int | None = None
     """Triangles that its lists draw, summed over all cameras; None without levels of detail."""
@@ -150,7 +150,7 @@ class Candidate:
         else:
             array: Any = depth
             pyramid = device.pyramid(array, camera, **depth_options, **self.pyramid_options)
-        return device.cull(instances, pyramid.camera, pyramid, self.options, meshes=self.meshes)
+        return device.cull(instances, pyramid.camera, pyramid, self.options, meshes=self.mesh_lods)
 
     def __str__(self) -> str:
         return str(self.configuration)

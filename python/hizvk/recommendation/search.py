@@ -183,7 +183,7 @@ class Search:
             bounds=asked.alternatives[one.volume],
             options=one.options(asked.options),
             selection=None if selected is None else asked.selections[selected],
-            meshes=None if one.lod is None else tuple(asked.meshes or ()),
+            mesh_lods=None if one.lod is None else tuple(asked.meshes or ()),
             triangles=row.triangles,
         )
 

@@ -24,7 +24,7 @@ __all__ = ["Levels", "colour_bar"]
 SIDE: Final = 512
 #: The gap between levels, in pixels.
 GAP: Final = 4
-#: Level numbers drawn in figures, per row.
+#: The panels per row of a figure.
 COLUMNS: Final = 4
 
 

@@ -49,6 +49,8 @@ class Seen(NamedTuple):
     numbers: list[tuple[str, str]]
     """More rows of the table."""
     unit: str
+    hints: tuple[str, ...] = ()
+    """What looks like a mistake of the caller, in sentences."""
 
     def counts(self) -> list[int]:
         """How many instances each class has."""
@@ -92,6 +94,7 @@ class Seen(NamedTuple):
                 )
             elif len(self.classes) > MOST_IN_PICTURE:
                 notes.append(f"{MOST_IN_PICTURE:,} of {len(self.classes):,} instances are drawn.")
+        notes += [f"Hint: {hint}" for hint in self.hints]
         rows += [list(row) for row in self.numbers]
         return document(
             self.title, self.picture(), table=((), rows), notes=notes, swatches=swatches
@@ -151,6 +154,7 @@ def seen_of(result: Any, bounds: object, unit: str = "m", *, must_know: bool = T
         depth=pyramid.level(0, kind=kind),
         numbers=_numbers(result, classes),
         unit=unit,
+        hints=_hints(result),
     )
 
 
@@ -168,6 +172,14 @@ def _classes(result: Any) -> tuple[npt.NDArray[np.uint8] | None, tuple[str, ...]
     classes[verdicts == _OCCLUDED] = HIDDEN
     classes[verdicts == _OUTSIDE] = OUTSIDE
     return classes, CLASSES
+
+
+def _hints(result: Any) -> tuple[str, ...]:
+    try:
+        hints: tuple[str, ...] = result.hints()
+    except ValueError:  # without verdicts nothing is known
+        return ()
+    return hints
 
 
 def _numbers(result: Any, classes: object) -> list[tuple[str, str]]:

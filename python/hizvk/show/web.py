@@ -93,7 +93,7 @@ def page_of(seen: Seen, meshes: list[Mesh] | None, up: str, most: int) -> str:
     if meshes is not None:
         rows.append(_row(3, OCCLUDER, "triangles that hide", f"{total:,}"))
     rows += [_row(None, "", *map(str, line)) for line in seen.numbers]
-    told = []
+    told = [f"Hint: {hint}." for hint in seen.hints]
     if len(shapes.indices) < len(seen.classes):
         told.append(f"{len(shapes.indices):,} of {len(seen.classes):,} instances are drawn.")
     if len(triangles) < total:

@@ -12,6 +12,7 @@ from .. import _arguments
 from .._types import Rasteriser, words
 from ..camera import Camera
 from ..depth import checked_image
+from ..resources import Instances, Occluders
 from .result import Sweep
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ __all__ = [
     "executor_of",
     "groups_of",
     "meaning_of",
+    "refuse_uploaded",
     "render_of",
     "resumed",
 ]
@@ -32,6 +34,19 @@ __all__ = [
 #: The most views of a block, and into how many blocks a sweep is cut at least where it can be.
 _MOST_VIEWS: Final = 16
 _LEAST_BLOCKS: Final = 16
+
+
+def refuse_uploaded(bounds: object, occluders: object) -> None:
+    """Refuses what lies on a device already: other processes cannot read it."""
+    for name, value, kind, instead in (
+        ("bounds", bounds, Instances, "Spheres, Boxes, OrientedBoxes or Points"),
+        ("occluders", occluders, Occluders, "meshes"),
+    ):
+        if isinstance(value, kind):
+            raise TypeError(
+                f"{name}: expected {instead}, got {_arguments.describe(value)}; each worker "
+                "uploads them to a device of its own, so pass them as they were before the upload"
+            )
 
 
 def cameras_of(cameras: object) -> tuple[Camera, ...]:

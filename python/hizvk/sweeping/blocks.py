@@ -19,6 +19,7 @@ So workers that join later are found, and no executor has to be asked how many i
 
 **What is tried again.**
 An engine such as Dask runs the blocks of a lost worker elsewhere, and nothing is seen of it here.
+Only if all workers die that hold the scene, it has to be given to the engine again.
 A pool of processes breaks as a whole.
 A pool of our own is then made anew, and runs the blocks that are left.
 """
@@ -46,6 +47,8 @@ __all__ = ["Job", "answers"]
 
 #: Pools in a row that may break before any of them has finished a block.
 FRUITLESS: Final = 3
+#: How often a block is sent whose scene the engine has lost.
+MOST_ATTEMPTS: Final = 8
 
 
 @dataclass(frozen=True)
@@ -115,6 +118,8 @@ def _handed_out(queue: _Queue) -> Iterator[Answer]:
             failed: BaseException | None = None
             for future in done:
                 block, carries = queue.running.pop(future)
+                if future.cancelled() and carries and queue.scatters_again(block):
+                    continue
                 error = None if future.cancelled() else future.exception()
                 if future.cancelled() or error is not None:
                     failed = failed or error or RuntimeError("the executor cancelled a block")
@@ -172,6 +177,14 @@ class _Queue:
         else:
             self._waiting.appendleft(again)
             self._held = True
+
+    def scatters_again(self, block: Block) -> bool:
+        """Sends a block again that the engine dropped, because all workers with the scene died."""
+        if self._job.engine is None or block.attempt >= MOST_ATTEMPTS:
+            return False
+        self._scattered = None
+        self._carriers.append((replace(block, attempt=block.attempt + 1), False))
+        return True
 
     def has_scene(self, worker: str, carried: bool) -> None:
         """A worker has run a block, so it has the scene."""

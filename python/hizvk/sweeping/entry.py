@@ -161,6 +161,7 @@ def sweep(
     >>> seen, seen.union().tolist()
     (<Sweep: 6 views of 2 instances>, [False, True])
     """
+    arguments.refuse_uploaded(bounds, occluders)
     as_arrays("bounds", bounds)
     views = arguments.cameras_of(cameras)
     if (occluders is None) == (depths is None):

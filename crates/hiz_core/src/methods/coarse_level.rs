@@ -73,8 +73,8 @@ impl LevelWay {
 enum Work {
     Fragment(FragmentLevels),
     Coarse { pipeline: wgpu::ComputePipeline, bindings: wgpu::BindGroup, level: wgpu::Buffer },
-    Pyramid { source: wgpu::TextureView, pyramid: Pyramid },
-    Mips { source: wgpu::TextureView, mips: MipTexture },
+    Pyramid { source: wgpu::TextureView, pyramid: Box<Pyramid> },
+    Mips { source: wgpu::TextureView, mips: Box<MipTexture> },
 }
 
 /// The levels of some images of one size, with everything made beforehand.
@@ -111,12 +111,12 @@ impl MethodLevels {
                     }
                     LevelWay::Pyramid(levels) => {
                         let options = PyramidOptions { levels, ..PyramidOptions::default() };
-                        let pyramid = engine.context().create_pyramid(size, &options)?;
+                        let pyramid = Box::new(engine.context().create_pyramid(size, &options)?);
                         Ok(Work::Pyramid { source: gpu.view(&texture)?, pyramid })
                     }
                     LevelWay::Mips => {
-                        let mips =
-                            engine.context().create_mip_texture(size, &MipOptions::default())?;
+                        let options = MipOptions::default();
+                        let mips = Box::new(engine.context().create_mip_texture(size, &options)?);
                         Ok(Work::Mips { source: gpu.view(&texture)?, mips })
                     }
                     _ => coarse(gpu, way.entry_point()?, &texture, size),

@@ -3,8 +3,8 @@
 //! Sources, each a shader's entry point in `shaders/methods/texts.wgsl`:
 //!
 //! - Daniel Rakos, "Hierarchical-Z map based occlusion culling", 2010.
-//! - ARM, "Occlusion Culling with Hierarchical-Z" (OpenGL ES SDK), with the bounds of a sphere by
-//!   Mara and McGuire, 2013.
+//! - ARM, "Occlusion Culling with Hierarchical-Z" (OpenGL ES SDK), with the bounds of a sphere of
+//!   2013 that `shaders/methods/texts.wgsl` cites.
 //! - Nick Darnell, "Hierarchical Z-Buffer Occlusion Culling", 2010.
 //! - One lookup at the middle of a rectangle, which the first text compares with four.
 //!
@@ -129,7 +129,7 @@ impl TextCull {
     ) -> Result<Self> {
         let gpu = &*engine.context().gpu;
         let vectors = text.vectors();
-        if bounds.is_empty() || bounds.len() % vectors != 0 {
+        if bounds.is_empty() || !bounds.len().is_multiple_of(vectors) {
             return Err(Error::invalid(
                 "bounds",
                 format!(

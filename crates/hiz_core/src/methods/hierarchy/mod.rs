@@ -1,9 +1,9 @@
-//! Hierarchical visibility: an octree of the scene is walked front to back against a pyramid of
-//! the depths that were drawn so far.
+//! Hierarchical visibility: an octree of the scene is walked front to back against a pyramid of the
+//! depths that were drawn so far.
 //!
 //! Source: Greene, Kass and Miller, *Hierarchical Z-buffer visibility*, SIGGRAPH 1993, sections 3.1
-//! (octree), 3.2 (pyramid) and 3.3 (coherence from frame to frame); as *Real-Time Rendering* (Moller
-//! and Haines 1999, the chapter on culling) tells it.
+//! (octree), 3.2 (pyramid) and 3.3 (coherence from frame to frame); as *Real-Time Rendering*
+//! (Moller and Haines 1999, the chapter on culling) tells it.
 //!
 //! 1. `tree`: an octree over meshlets.
 //!    Above `threshold` meshlets a node is split, down to a deepest level.
@@ -24,6 +24,7 @@
 //! A hidden box is farther than all pixels of its rectangle, with margins for every rounding.
 //! So the image has the same bits as one that was drawn without skipping.
 
+mod frame;
 mod planted_fault;
 mod tree;
 mod walk;
@@ -47,6 +48,9 @@ use crate::occluders::host_raster::{HostRaster, Scene, Told, Way};
 use crate::occluders::placement::Placement;
 use crate::occluders::surface::OccluderSurface;
 
+pub use frame::{
+    CoveredCentres, FlatFrame, HierarchyCounts, HierarchyFrame, HierarchyNode, NodeState,
+};
 #[cfg(feature = "testing")]
 pub use planted_fault::HierarchyFault;
 
@@ -65,99 +69,6 @@ impl Default for HierarchyOptions {
     }
 }
 
-/// What became of a node in a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum NodeState {
-    /// A node above it was hidden or outside of the view.
-    NotVisited = 0,
-    /// Its box is outside of the view.
-    Outside = 1,
-    /// Its box was hidden when its turn came.
-    Hidden = 2,
-    /// Its box was not hidden when its turn came.
-    Visible = 3,
-}
-
-/// What a frame did.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct HierarchyCounts {
-    /// Depths that the tests of nodes compared: one for each cell, and one for each pixel.
-    pub comparisons: u64,
-    /// Nodes whose test took one comparison.
-    pub settled_by_one: u64,
-    /// Triangles that the boxes of nodes or of meshlets show to be outside of the view.
-    pub triangles_outside: u64,
-    /// Triangles in and below hidden nodes.
-    pub triangles_in_hidden_nodes: u64,
-    /// Triangles of hidden meshlets in visible nodes.
-    pub triangles_in_hidden_meshlets: u64,
-    /// Triangles of the meshlets that were drawn.
-    pub triangles_drawn: u64,
-    /// Meshlets that were drawn.
-    pub meshlets_drawn: u64,
-}
-
-/// How many pixels' centres triangles cover, each triangle by itself.
-///
-/// Divided by the number of pixels this is the depth complexity.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct CoveredCentres {
-    /// Of all triangles in the view.
-    pub in_view: u64,
-    /// Of the meshlets that were drawn.
-    pub drawn: u64,
-}
-
-/// A frame of [`HierarchicalVisibility`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct HierarchyFrame {
-    /// NDC depth, row 0 on top.
-    pub depth: Vec<f32>,
-    /// Levels 1 to the coarsest one of the pyramid, with their sizes.
-    pub levels: Vec<(ImageSize, Vec<f32>)>,
-    /// By node.
-    pub states: Vec<NodeState>,
-    /// Nodes that hold meshlets and that the finished image does not hide, ascending.
-    pub visible_leaves: Vec<u32>,
-    /// What it took.
-    pub counts: HierarchyCounts,
-    /// If it was asked for.
-    pub centres: Option<CoveredCentres>,
-    /// Milliseconds of the drawing on its one thread, without what comes after it.
-    pub milliseconds: f64,
-}
-
-/// The same image by the rasteriser's own list: all meshlets in the view, sorted front to back.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FlatFrame {
-    /// NDC depth, row 0 on top.
-    pub depth: Vec<f32>,
-    /// Meshlets that were drawn.
-    pub meshlets_drawn: u64,
-    /// Their triangles.
-    pub triangles_drawn: u64,
-    /// Milliseconds of the drawing on one thread.
-    pub milliseconds: f64,
-}
-
-/// A node of the tree, for those who look at it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HierarchyNode {
-    /// The box around what it and the nodes below it hold, in world coordinates.
-    pub min: [f64; 3],
-    /// The greatest corner of that box.
-    pub max: [f64; 3],
-    /// The number of the node above it; the root has none.
-    pub parent: Option<u32>,
-    /// The root has level 0.
-    pub level: u32,
-    /// Meshlets that it holds itself.
-    pub meshlets: u32,
-    /// Triangles in it and below it.
-    pub triangles: u64,
-}
-
 /// The algorithm of Greene, Kass and Miller over the meshlets of triangle meshes.
 ///
 /// # Examples
@@ -170,19 +81,22 @@ pub struct HierarchyNode {
 /// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
 /// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
 ///
-/// // A wall that fills the view, and the same wall behind it.
-/// let wall = |z: f64| [-50.0, -50.0, z, 50.0, -50.0, z, -50.0, 50.0, z, 50.0, 50.0, z];
-/// let (front, behind) = (wall(-10.0), wall(-20.0));
-/// let meshes = [&front, &behind].map(|corners| MeshData {
-///     vertices: Floats::F64(corners),
-///     triangles: &[0, 1, 2, 2, 1, 3],
-///     transforms: None,
-/// });
+/// // A wall that fills the view, and 16 triangles in a row behind it.
+/// let wall = [-50.0, -50.0, -10.0, 50.0, -50.0, -10.0, -50.0, 50.0, -10.0, 50.0, 50.0, -10.0];
+/// let row: Vec<[f64; 9]> = (-8..8)
+///     .map(f64::from)
+///     .map(|x| [x, 0.0, -30.0, x + 1.0, 0.0, -30.0, x, 1.0, -30.0])
+///     .collect();
+/// let mesh = |corners, triangles| {
+///     MeshData { vertices: Floats::F64(corners), triangles, transforms: None }
+/// };
+/// let behind = row.iter().map(|corners| mesh(&corners[..], &[0, 1, 2][..]));
+/// let meshes: Vec<_> = std::iter::once(mesh(&wall, &[0, 1, 2, 2, 1, 3])).chain(behind).collect();
 /// let options = HierarchyOptions { threshold: 1, ..HierarchyOptions::default() };
 /// let scene = HierarchicalVisibility::new(&meshes, &OccluderOptions::default(), &options)?;
 /// let frame = scene.render(&camera, &[], false)?;
 /// assert_eq!(frame.counts.triangles_drawn, 2);
-/// assert_eq!(frame.counts.triangles_in_hidden_nodes, 2);
+/// assert_eq!(frame.counts.triangles_in_hidden_nodes, 16);
 /// # Ok::<(), hiz_core::Error>(())
 /// ```
 #[derive(Debug)]
@@ -281,7 +195,8 @@ impl HierarchicalVisibility {
 
     /// Draws what `camera` sees, front to back.
     ///
-    /// `previous` are nodes that are drawn first and untested: the visible leaves of the last frame.
+    /// `previous` are nodes that are drawn first and untested: the visible leaves of the last
+    /// frame.
     /// They change no pixel, and neither does their order.
     /// `count` asks for [`HierarchyFrame::centres`], which takes much longer than the frame.
     ///

@@ -3,9 +3,9 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use crate::methods::hierarchy::frame::{HierarchyCounts, NodeState};
 use crate::methods::hierarchy::tree::{Node, Tree};
 use crate::methods::hierarchy::z_pyramid::ZPyramid;
-use crate::methods::hierarchy::{HierarchyCounts, NodeState};
 use crate::occluders::host_raster::one_by_one::{Extent, Looks, OneByOne};
 use crate::occluders::shapes::Shapes;
 
@@ -67,11 +67,8 @@ impl Walk<'_, '_> {
     /// Draws what the nodes of the last frame hold, then walks; returns the visible leaves.
     pub(super) fn frame(&mut self, previous: &[u32]) -> Vec<u32> {
         let mut is_drawn = vec![false; self.tree.nodes.len()];
-        for node in previous {
-            if !std::mem::replace(&mut is_drawn[*node as usize], true) {
-                self.draw_untested(&self.tree.nodes[*node as usize]);
-            }
-        }
+        previous.iter().for_each(|node| is_drawn[*node as usize] = true);
+        self.draw_untested(&is_drawn);
         let mut waiting = BinaryHeap::new();
         let mut leaves = Vec::new();
         if !self.tree.nodes.is_empty() {
@@ -174,13 +171,22 @@ impl Walk<'_, '_> {
         }
     }
 
-    /// Draws what a node of the last frame holds, as far as it is in the view.
-    fn draw_untested(&mut self, node: &Node) {
-        for index in node.own.clone() {
-            let item = self.tree.items[index as usize];
-            match self.image.extent_of(self.looks, item) {
-                Some(extent) => self.draw(index, &extent),
-                None => self.counts.triangles_outside += self.triangles(item),
+    /// Draws what these nodes hold, as far as it is in the view, nearest first.
+    fn draw_untested(&mut self, is_chosen: &[bool]) {
+        let mut seen: Vec<Waiting> = Vec::new();
+        for (node, _) in self.tree.nodes.iter().zip(is_chosen).filter(|(_, chosen)| **chosen) {
+            for index in node.own.clone() {
+                let item = self.tree.items[index as usize];
+                match self.image.extent_of(self.looks, item) {
+                    Some(extent) => seen.push(Waiting { extent, what: What::Meshlet(index) }),
+                    None => self.counts.triangles_outside += self.triangles(item),
+                }
+            }
+        }
+        seen.sort_unstable_by_key(|waiting| Reverse(waiting.key()));
+        for waiting in seen {
+            if let What::Meshlet(index) = waiting.what {
+                self.draw(index, &waiting.extent);
             }
         }
     }

@@ -7,16 +7,16 @@
 //! 2. They are drawn in white on black, without a Z-buffer; `levels` averages the image down.
 //! 3. `estimate` keeps one depth for each of 64x64 regions: the farthest vertex of the boxes of the
 //!    occluders there.
-//! 4. `cull` projects the bounds of an instance, asks the maps whether its rectangle is covered, and
-//!    the regions whether it lies behind.
+//! 4. `cull` projects the bounds of an instance.
+//!    It asks the maps whether the rectangle is covered, and the regions whether it lies behind.
 //!
 //! `options` says how maps are made, and `map` holds them.
 //!
 //! Averages are kept as whole numbers of covered pixels, so no byte rounds them.
 //!
 //! **What it cannot promise.**
-//! With a negligible hole of 0 pixels, an instance is culled only if every pixel of its rectangle is
-//! covered, and if it lies behind the boxes of all occluders there.
+//! With a negligible hole of 0 pixels, an instance is culled only under two conditions.
+//! Every pixel of its rectangle is covered, and it lies behind the boxes of all occluders there.
 //! So none of the image's pixel centres shows it.
 //! A larger image may show it beside an occluder that covers a centre alone.
 //! With a larger hole it may also show through that hole.

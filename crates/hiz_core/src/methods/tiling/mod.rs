@@ -11,8 +11,8 @@
 //!
 //! A part of a split triangle is the triangle with the lines along which it was cut.
 //! Its corners would be rounded to the grid otherwise, and cracks would open.
-//! So the parts cover what the triangle covers, each pixel once, and the image's coverage is that of
-//! the library's rasteriser bit for bit.
+//! So the parts cover what the triangle covers, each pixel once.
+//! The image's coverage is that of the library's rasteriser bit for bit.
 //!
 //! A far plane cuts nothing here: what lies beyond it covers pixels, too.
 

@@ -12,6 +12,8 @@ use crate::occluders::host_raster::edges::{
 use crate::occluders::host_raster::lanes::{lanes, three};
 use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS, greatest, least};
 use crate::occluders::host_raster::planted_fault::is_planted;
+#[cfg(feature = "methods")]
+use crate::occluders::host_raster::tile::is_covered;
 use crate::occluders::host_raster::tile::{
     CLEAR, FULL, Layers, Mask, PIXELS, Plane, Rise, SIDE, State, Tile, row_of_layers,
 };
@@ -108,7 +110,7 @@ impl Band {
 
     /// Whether nothing within `extent` would show in this band.
     ///
-    /// Cells are asked first, and tiles where a cell cannot tell.
+    /// Cells are asked first, tiles where a cell cannot tell, and pixels where a tile cannot.
     pub(super) fn hides(&mut self, extent: &Extent) -> bool {
         let Some((rows, columns)) = self.tiles_of(extent) else { return true };
         for cell_row in rows.start() / LANES..=rows.end() / LANES {
@@ -122,14 +124,34 @@ impl Band {
                 };
                 let columns = within(&columns, cell);
                 for row in within(&rows, cell_row) {
-                    let tiles = &self.farthest[row * self.across..][columns.clone()];
-                    if tiles.iter().any(|farthest| *farthest < extent.nearest) {
-                        return false;
+                    for column in columns.clone() {
+                        if self.farthest[row * self.across + column] < extent.nearest
+                            && !self.pixels_hide(column, row, extent)
+                        {
+                            return false;
+                        }
                     }
                 }
             }
         }
         true
+    }
+
+    /// Whether the pixels of a tile hide the part of `extent` that lies in it.
+    #[inline(never)]
+    fn pixels_hide(&self, column: usize, row: usize, extent: &Extent) -> bool {
+        if self.states[row * self.across + column] == CLEAR {
+            return false;
+        }
+        let within = |(first, last): (i32, i32), begin: i32| {
+            ((first - begin).max(0) as usize, (last - begin).min(STEP - 1) as usize)
+        };
+        let (left, right) = within(extent.columns, (column * SIDE) as i32);
+        let (top, bottom) = within(extent.rows, self.top + (row * SIDE) as i32);
+        (top..=bottom).all(|y| {
+            let pixels = self.row_of_tile(column, row, y);
+            pixels[left..=right].iter().all(|nearness| *nearness >= extent.nearest)
+        })
     }
 
     /// The farthest depth of a cell, in rows and columns of cells.
@@ -494,12 +516,14 @@ impl Band {
     #[cfg(feature = "methods")]
     pub(super) fn exact_farthest(&self, column: usize, row: usize) -> Option<f32> {
         let tile = row * self.across + column;
-        let is_exact = matches!(self.states[tile], CLEAR | FULL | PIXELS);
-        is_exact.then_some(self.farthest[tile])
+        match self.states[tile] {
+            CLEAR | FULL | PIXELS => Some(self.farthest[tile]),
+            state => (!is_covered(state, &self.layers[tile])).then_some(0.0),
+        }
     }
 
     /// Nearness in row `y` of a tile, as it is now.
-    #[cfg(feature = "methods")]
+    #[inline(always)]
     pub(super) fn row_of_tile(&self, column: usize, row: usize, y: usize) -> [f32; SIDE] {
         let tile = row * self.across + column;
         match self.states[tile] {

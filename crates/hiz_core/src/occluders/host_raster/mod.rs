@@ -5,8 +5,9 @@
 //! This one draws depth alone, and looks first at what it need not draw:
 //!
 //! 1. `lens`: the box of each meshlet against the view; the rest is sorted front to back.
-//! 2. `band`: a meshlet whose box is behind the farthest depth of all tiles that it meets is
-//!    skipped (Greene, Kass and Miller 1993; Greene 1996).
+//! 2. `band`: a meshlet whose box is behind all that was drawn where it would show is skipped
+//!    (Greene, Kass and Miller 1993; Greene 1996).
+//!    The farthest depths of tiles tell this, and pixels where tiles cannot.
 //! 3. `vertices`: positions in the image, and the triangles that may cover a pixel's centre.
 //! 4. `triangle`: exact edges on a grid of 1/256 pixel, and the plane of the depth.
 //!    `edges` follows them from pixel to pixel and from tile to tile.

@@ -25,8 +25,8 @@ pub(crate) use crate::occluders::host_raster::lens::Extent;
 /// Pixels along a side of a tile, as a power of two.
 pub(crate) const TILE_LOG2: u32 = SIDE.trailing_zeros();
 
-/// A box in world coordinates, and how much larger than in the world a row's terms may be where
-/// its vertices are computed.
+/// A box in world coordinates, and how much larger than in the world a row's terms may be where its
+/// vertices are computed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WorldBox {
     pub(crate) min: Vec3,

@@ -244,6 +244,13 @@ fn least_of(v: &[f32; SIDE]) -> f32 {
     least(least(half[0], half[2]), least(half[1], half[3]))
 }
 
+/// Whether layers cover all of a tile.
+#[cfg(feature = "methods")]
+pub(super) fn is_covered(state: State, layers: &Layers) -> bool {
+    let used = &layers[..usize::from(state).min(MOST_LAYERS)];
+    used.iter().fold(0, |covered, layer| covered | layer.mask) == Mask::MAX
+}
+
 /// Row `row` of a tile whose depth is in layers, not in pixels.
 #[inline(always)]
 pub(super) fn row_of_layers(
