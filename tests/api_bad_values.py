@@ -291,7 +291,7 @@ DEPTH_SLACK: list[Bad] = [
 ]
 FOOTPRINT: list[Bad] = [
     (3, ValueError, "expected one of 1, 2, 4, 8, got 3"),
-    (16, ValueError, "in 1..8"),
+    (16, ValueError, "expected one of 1, 2, 4, 8, got 16"),
     (2.0, TypeError, "got float 2.0"),
 ]
 FIT: list[Bad] = [

@@ -146,6 +146,15 @@ def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
     return array
 
 
+def _without_rows(value: object, shape: Sequence[int | str]) -> object:
+    """An empty list or tuple as an array of no rows, where that is a shape; else as it came."""
+    if isinstance(value, (list, tuple)) and not value and len(shape) > 1:
+        rest = [side for side in shape[1:] if isinstance(side, int)]
+        if (isinstance(shape[0], str) or shape[0] == 0) and len(rest) == len(shape) - 1:
+            return np.zeros((0, *rest))
+    return value
+
+
 def _fits(shape: Sequence[int | str], sides: Sequence[int]) -> bool:
     """Whether an array of these sides has this shape (letters are free sides)."""
     return len(sides) == len(shape) and all(
@@ -162,6 +171,15 @@ def shape_hint(shape: Sequence[int | str], sides: Sequence[int]) -> str:
     # Two free or two fixed sides (an image) may be in the wrong order elsewhere.
     if len(sides) == 2 and len({type(side) for side in shape}) == 2 and _fits(shape, sides[::-1]):
         return "; it looks transposed, pass .T"
+    rest = [side for side in shape[1:] if isinstance(side, int) and side > 0]
+    if len(sides) == 1 and rest and len(rest) == len(shape) - 1:
+        # One row, several of them in a line, or none at all.
+        rows, over = divmod(sides[0], math.prod(rest))
+        if not over and (isinstance(shape[0], str) or shape[0] == rows):
+            first = -1 if isinstance(shape[0], str) and rows else rows
+            return f"; pass .reshape({first}, {', '.join(map(str, rest))})"
+    if len(sides) == 2 and shape == ("N", 3) and sides[1] > 3:
+        return "; pass [:, :3], if these columns are x, y, z"
     return ""
 
 
@@ -225,7 +243,7 @@ def floats(
     With `whole` an array of whole numbers will do, if floats hold them exactly.
     """
     expected = f"float {_shape_text(shape)}{why}"
-    array = _as_array(name, expected, value)
+    array = _as_array(name, expected, _without_rows(value, shape))
     is_whole = whole and array.dtype.kind in "iu"
     if not is_whole and (array.dtype.kind != "f" or array.dtype.itemsize not in (2, 4, 8)):
         got = describe(array if array.ndim else value)
@@ -304,7 +322,8 @@ def numbers_of_shape(
             f"{name}: expected {expected}, got {describe(array if array.ndim else value)}"
         )
     if array.shape not in shapes:
-        _check_shape(name, expected, array, shapes[-1], hint)
+        ways = (shape_hint(shape, array.shape) for shape in shapes)
+        _check_shape(name, expected, array, shapes[-1], next(filter(None, ways), hint))
     result: npt.NDArray[np.float64] = np.array(array, dtype=np.float64, order="C")
     if not np.isfinite(result).all():
         raise ValueError(
@@ -437,7 +456,8 @@ def size(name: str, value: object) -> Size:
     if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)):
         raise _wrong_type(name, expected, value)
     if (isinstance(value, np.ndarray) and value.ndim == 0) or len(value) != 2:
-        raise _wrong_value(name, expected, value)
+        hint = "; of an image with channels pass .shape[:2]" if np.shape(value) == (3,) else ""
+        raise ValueError(f"{name}: expected {expected}, got {describe(value)}{hint}")
     sides = []
     for side in value:
         try:
@@ -492,14 +512,14 @@ def text(name: str, value: object) -> str:
     return value
 
 
-def instance(name: str, value: object, wanted: type[T], expected: str) -> T:
-    """An object of this class."""
+def instance(name: str, value: object, wanted: type[T], expected: str, hint: str = "") -> T:
+    """An object of this class; `hint` ends the message where it is none."""
     if isinstance(value, wanted):
         return value
     if isinstance(value, (list, tuple)) and value and all(isinstance(one, wanted) for one in value):
         got = f"{type(value).__name__} of {len(value)}"
         raise TypeError(f"{name}: expected {expected}, got a {got}; pass one a call, in a loop")
-    raise _wrong_type(name, expected, value)
+    raise TypeError(f"{name}: expected {expected}, got {describe(value)}{hint}")
 
 
 def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
@@ -518,8 +538,9 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
     if array.size == 0 and not hasattr(value, "dtype"):
         array = array.astype(np.bool_)
     if array.dtype.kind != "b":
+        way = "; pass numpy.asarray(...) != 0" if array.dtype.kind in "iuf" and array.ndim else ""
         raise TypeError(
-            f"{name}: expected {expected}, got {describe(array if array.ndim else value)}"
+            f"{name}: expected {expected}, got {describe(array if array.ndim else value)}{way}"
         )
     _check_shape(name, expected, array, shape)
     return copied(name, array, np.bool_)
@@ -596,16 +617,20 @@ def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uin
     if array.size == 0 and not hasattr(value, "dtype"):
         array = array.reshape(0, 3).astype(np.uint32)
     if array.dtype.kind not in "iu":
+        way = "; convert it with .astype(np.int64)" if array.dtype.kind == "f" else ""
         raise TypeError(
-            f"{name}: expected {expected}, got {describe(array if array.ndim else value)}"
+            f"{name}: expected {expected}, got {describe(array if array.ndim else value)}{way}"
         )
-    _check_shape(name, expected, array, ("T", 3))
+    hint = "; split each face into triangles first" if array.shape[1:] == (4,) else ""
+    _check_shape(name, expected, array, ("T", 3), hint)
     array = copied(name, array, array.dtype.newbyteorder("="))
     if array.size:
         low, high = int(array.min()), int(array.max())
         if low < 0 or high >= vertex_count:
             wrong = low if low < 0 else high
+            # OBJ files count from 1.
+            way = "; they seem to count from 1: subtract 1" if low and wrong == vertex_count else ""
             raise ValueError(
-                f"{name}: expected vertex indices in 0..{vertex_count - 1}, got {wrong}"
+                f"{name}: expected vertex indices in 0..{vertex_count - 1}, got {wrong}{way}"
             )
     return copied(name, array, np.uint32)

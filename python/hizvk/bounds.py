@@ -432,7 +432,7 @@ def _sides(value: Any) -> tuple[int, ...] | None:
 def _for_each(name: str, value: npt.ArrayLike, count: int) -> FloatArray:
     """``(count, 3)``, also from one row or one number for all."""
     sides = _sides(value)
-    if sides is None or len(sides) > 1:
+    if sides is None or len(sides) > 1 or (sides == (0,) and not count):
         return _arguments.floats(name, value, (count, 3))
     row = np.asarray(_arguments.floats_or_scalar(name, value, 3), np.float64)
     return np.broadcast_to(row, (count, 3))
@@ -461,6 +461,8 @@ def as_arrays(name: str, bounds: object) -> tuple[str, tuple[FloatArray, ...]]:
     }
     way = ways.get((_sides(bounds) or ())[1:])
     hint = f"; pass {way}, if that is what the numbers are" if way else ""
+    if isinstance(bounds, tuple) and len(bounds) == 2:
+        hint = f"; pass hizvk.Boxes(*{name}) or hizvk.Spheres(*{name})"
     raise TypeError(f"{name}: expected Spheres, Boxes, OrientedBoxes or Points, got {got}{hint}")
 
 

@@ -235,6 +235,10 @@ def _refuse_shape(name: str, array: npt.NDArray[Any], camera: Camera) -> None:
         )
         if array.shape == size[::-1]:
             hint = f"; it looks transposed, and a turned image needs a turned camera{hint}"
+    elif array.shape[:2] == size and array.ndim == 3:
+        hint = f"; if all channels are the same depth, pass {name}[..., 0]"
+    elif array.shape == (size[0] * size[1],):
+        hint = f"; pass {name}.reshape(camera.size), if it is stored row by row"
     got = _arguments.describe(array)
     raise ValueError(f"{name}: expected {expected} {size} (the camera's size), got {got}{hint}")
 
@@ -250,7 +254,9 @@ def no_data_of(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
     if isinstance(invalid, np.ndarray) and invalid.ndim == 1 and invalid.dtype.kind in "fiu":
         invalid = invalid.tolist()
     if isinstance(invalid, (str, bytes, np.ndarray)) or not isinstance(invalid, Collection):
-        raise TypeError(f"invalid: expected {expected}, got {_arguments.describe(invalid)}")
+        hint = f"; pass [{invalid}]" if isinstance(invalid, (int, float)) else ""
+        got = _arguments.describe(invalid)
+        raise TypeError(f"invalid: expected {expected}, got {got}{hint}")
     found = []
     for value in invalid:
         if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):

@@ -31,7 +31,7 @@ from .mesh import as_meshes
 from .options import Outputs, cull_options, cull_request
 from .progress import Progress, check_progress
 from .renewal import Source
-from .resources import DepthImage, Instances, Occluders, Pyramid
+from .resources import A_PYRAMID, SOME_INSTANCES, DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
 from .samples import checked_samples
 from .temporal import PassResult, Temporal
@@ -819,13 +819,13 @@ class Device:
         LimitError, OutOfMemoryError
             If the device cannot hold the outputs.
         """
-        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        _arguments.instance("instances", instances, Instances, *SOME_INSTANCES)
         check_owner("instances", instances, self)
         options, outputs = cull_request(options, outputs, keywords)
         wait = _arguments.flag("wait", wait)
         restriction = among_of(among, instances, self)
         if isinstance(camera, Camera):
-            _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
+            _arguments.instance("pyramid", pyramid, Pyramid, *A_PYRAMID)
             assert isinstance(pyramid, Pyramid)
             check_owner("pyramid", pyramid, self)
             if camera != pyramid.camera:
@@ -914,10 +914,10 @@ class Device:
         LimitError, OutOfMemoryError
             If the device cannot hold the counts.
         """
-        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        _arguments.instance("instances", instances, Instances, *SOME_INSTANCES)
         check_owner("instances", instances, self)
         _arguments.instance("camera", camera, Camera, "a Camera")
-        _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
+        _arguments.instance("pyramid", pyramid, Pyramid, *A_PYRAMID)
         check_owner("pyramid", pyramid, self)
         if camera != pyramid.camera:
             raise ValueError(_other_camera("camera", camera, pyramid))
@@ -1055,7 +1055,7 @@ class Device:
         OutOfMemoryError
             If the device cannot hold the masks.
         """
-        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        _arguments.instance("instances", instances, Instances, *SOME_INSTANCES)
         check_owner("instances", instances, self)
         if early_capacity is not None:
             high = 2**32 - 1
@@ -1124,7 +1124,7 @@ class Device:
         >>> device.cull(crowd, camera, pyramid, outputs=["mask"]).count
         1000
         """
-        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        _arguments.instance("instances", instances, Instances, *SOME_INSTANCES)
         check_owner("instances", instances, self)
         _arguments.instance("camera", camera, Camera, "a Camera")
         self._check_side(camera)

@@ -123,6 +123,11 @@ class Question:
                     'or outside of the view; coverage="area" keeps small ones',
                 )
             return _outside(stats.tested, self.camera, bounds)
+        if stats.invalid == stats.tested:
+            return (
+                f"bounds: all {stats.tested:,} are invalid, so all are kept: a number is NaN or "
+                "infinite, a size is negative, or min is above max",
+            )
         if stats.occluded or stats.kept == stats.invalid:
             return ()
         return self._depth()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypeAlias
@@ -176,6 +177,10 @@ def as_mesh(name: str, value: object, expected: str) -> Mesh:
     parts = value if is_tuple else foreign.mesh_parts(name, value)
     if parts is None:
         hint = foreign.way_to_a_mesh(value)
+        if isinstance(value, (str, os.PathLike)):
+            hint = "; read the file first, for instance with trimesh.load"
+        elif isinstance(value, (list, np.ndarray)):
+            hint = "; of arrays pass hizvk.Mesh(vertices, triangles)"
         raise TypeError(f"{name}: expected {expected}, got {_arguments.describe(value)}{hint}")
     return _made(name, *parts)  # type: ignore[misc]
 

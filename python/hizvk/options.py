@@ -83,10 +83,10 @@ def _guard(name: str, value: object) -> float | None:
 
 
 def _footprint(name: str, value: object) -> int:
-    footprint = _arguments.integer(name, value, low=1, high=8)
-    if footprint not in FOOTPRINTS:
-        raise ValueError(f"{name}: expected one of 1, 2, 4, 8, got {footprint}")
-    return footprint
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if whole and value not in FOOTPRINTS:
+        raise ValueError(f"{name}: expected one of 1, 2, 4, 8, got {value}")
+    return _arguments.integer(name, value, low=1, high=8)
 
 
 def _flag_or_none(name: str, value: object) -> bool | None:
@@ -443,7 +443,8 @@ def _outputs_of(names: object) -> Outputs:
     """The outputs of these names, and no others."""
     if isinstance(names, str) or not isinstance(names, Collection):
         expected = f"None or a collection of {', '.join(map(repr, OUTPUTS))}, or an Outputs"
-        raise TypeError(f"outputs: expected {expected}, got {_arguments.describe(names)}")
+        hint = f'; pass ["{names}"]' if names in OUTPUTS else ""
+        raise TypeError(f"outputs: expected {expected}, got {_arguments.describe(names)}{hint}")
     asked = frozenset(_arguments.choice("outputs", name, OUTPUTS) for name in names)
     made = _NAMED.get(asked)
     if made is None:

@@ -55,7 +55,10 @@ class PointColours(NamedTuple):
     """``(N,)`` float32: the sum of the weights."""
 
     def bytes(self) -> npt.NDArray[np.uint8]:
-        """``(N, 3)`` uint8: the colours of images of 0 to 255, rounded."""
+        """``(N, 3)`` uint8: the colours of images of 0 to 255, rounded.
+
+        Of images of 0 to 1, it is ``numpy.rint(255 * seen.colours)`` instead.
+        """
         return np.clip(np.rint(self.colours), 0.0, 255.0).astype(np.uint8)
 
 
@@ -189,7 +192,8 @@ def _view(
     array = np.asarray(image)
     if array.dtype.kind not in "uf" or (array.dtype.kind == "u" and array.dtype.itemsize > 1):
         got = _arguments.describe(image)
-        raise TypeError(f"views: expected uint8 or float images {expected}, got {got}")
+        hint = "; pass image / 257.0, which is 0 to 255" if array.dtype == np.uint16 else ""
+        raise TypeError(f"views: expected uint8 or float images {expected}, got {got}{hint}")
     if array.shape != expected:
         got = _arguments.describe(image)
         raise ValueError(

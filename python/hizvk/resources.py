@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Final, overload
 
 from . import _arguments, mips
 from ._core import DepthImage as CoreDepthImage
@@ -28,6 +28,17 @@ if TYPE_CHECKING:
     from .renewal import Source
 
 __all__ = ["DepthImage", "Instances", "Occluders", "Pyramid"]
+
+
+#: What is expected and the way to it, for messages of `_arguments.instance`.
+SOME_INSTANCES: Final = (
+    "Instances of Device.instances",
+    "; bounds become instances by device.instances(bounds)",
+)
+A_PYRAMID: Final = (
+    "a Pyramid of Device.pyramid",
+    "; depth becomes one by device.pyramid(depth, camera, kind=...)",
+)
 
 
 class Instances(Allocated[CoreInstances]):

@@ -66,5 +66,7 @@ def numbers_of(name: str, value: Any) -> tuple[float, float]:
     """``rel`` and ``abs`` of a tolerance; None: both 0."""
     if value is None:
         return 0.0, 0.0
-    given = _arguments.instance(name, value, Tolerance, "a hizvk.Tolerance or None")
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    hint = f"; pass hizvk.Tolerance(abs={value})" if is_number else ""
+    given = _arguments.instance(name, value, Tolerance, "a hizvk.Tolerance or None", hint)
     return given.rel, given.abs

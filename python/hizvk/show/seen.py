@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -133,7 +134,9 @@ def seen_of(result: Any, bounds: object, unit: str = "m", *, must_know: bool = T
     else:
         expected = "Spheres, Boxes, OrientedBoxes or Points"
         if not isinstance(bounds, (Spheres, Boxes, OrientedBoxes, Points)):
-            raise TypeError(f"bounds: expected {expected}, got {_arguments.describe(bounds)}")
+            is_path = isinstance(bounds, (str, os.PathLike))
+            way = "; a path goes to plot().savefig(path), or to save_html(path)" if is_path else ""
+            raise TypeError(f"bounds: expected {expected}, got {_arguments.describe(bounds)}{way}")
         if len(bounds) != count:
             raise ValueError(
                 f"bounds: expected those of the {count} instances that were tested, "

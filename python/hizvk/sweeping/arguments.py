@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any, Final
 
@@ -55,7 +55,8 @@ def cameras_of(cameras: object) -> tuple[Camera, ...]:
     if isinstance(cameras, Camera):
         cameras = [cameras]
     if isinstance(cameras, str) or not isinstance(cameras, Sequence):
-        raise TypeError(f"cameras: expected {expected}, got {_arguments.describe(cameras)}")
+        way = "; pass list(cameras)" if isinstance(cameras, Iterable) else ""
+        raise TypeError(f"cameras: expected {expected}, got {_arguments.describe(cameras)}{way}")
     if not cameras:
         raise ValueError(f"cameras: expected {expected}, got an empty one")
     for number, one in enumerate(cameras):
@@ -71,7 +72,9 @@ def depths_of(depths: Any, count: int) -> Any:
         return depths
     expected = f"{count} arrays, one for each camera, or a function of the view's number"
     if isinstance(depths, (str, bytes)) or not hasattr(depths, "__getitem__"):
-        raise TypeError(f"depths: expected {expected}, got {_arguments.describe(depths)}")
+        is_lazy = isinstance(depths, Iterator)
+        way = "; pass list(depths), or a function that loads one" if is_lazy else ""
+        raise TypeError(f"depths: expected {expected}, got {_arguments.describe(depths)}{way}")
     try:
         given = len(depths)
     except TypeError:

@@ -1,0 +1,158 @@
+"""What newcomers pass at first: it is taken, or the message ends with the way out."""
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hizvk
+
+SIZE = (6, 8)
+CAMERA = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=SIZE, near=0.1)
+DEPTH = np.full(SIZE, 10.0)
+CORNERS = [(0.0, 0.0, -5.0), (1.0, 0.0, -5.0), (1.0, 1.0, -5.0), (0.0, 1.0, -5.0)]
+BALLS = hizvk.Spheres([(0.0, 0.0, -5.0)], 0.5)
+K = [100.0, 0.0, 4.0, 0.0, 100.0, 3.0, 0.0, 0.0, 1.0]
+
+
+def opencv(k: Any, pose: Any, size: Any = SIZE) -> hizvk.Camera:
+    return hizvk.Camera.from_opencv(
+        k, pixel_center="half", camera_from_world=pose, size=size, near=0.1
+    )
+
+
+def colour(image: Any, **more: Any) -> Any:
+    points = more.pop("points", hizvk.Points(CORNERS))
+    return hizvk.colour_points(points, [(CAMERA, DEPTH, image)], kind="z", **more)
+
+
+def culled(device: hizvk.Device, **more: Any) -> hizvk.CullResult:
+    hiz = device.pyramid(DEPTH, CAMERA, kind="z")
+    asked: dict[str, Any] = {"instances": device.instances(BALLS), "pyramid": hiz} | more
+    return device.cull(asked.pop("instances"), CAMERA, asked.pop("pyramid"), **asked)
+
+
+WAYS: list[tuple[Callable[[hizvk.Device], object], str]] = [
+    # One row, several rows in a line, more columns than three.
+    (lambda _: hizvk.Spheres([0.0, 0.0, -5.0], 1.0), "pass .reshape(-1, 3)"),
+    (lambda _: hizvk.Spheres(np.zeros(12), 1.0), "pass .reshape(-1, 3)"),
+    (lambda _: hizvk.Points(np.zeros(0)), "pass .reshape(0, 3)"),
+    (lambda _: hizvk.Points(np.zeros((5, 4))), "pass [:, :3], if these columns are x, y, z"),
+    (lambda _: opencv(K, np.eye(4)), "pass .reshape(3, 3)"),
+    (lambda _: opencv(np.reshape(K, (3, 3)), np.eye(4)[:3].ravel()), "pass .reshape(3, 4)"),
+    (lambda _: opencv(np.reshape(K, (3, 3)), np.eye(4), (6, 8, 3)), "pass .shape[:2]"),
+    # Meshes.
+    (lambda _: hizvk.Mesh(CORNERS, [[0, 1, 2, 3]]), "split each face into triangles first"),
+    (lambda _: hizvk.Mesh(CORNERS, [0, 1, 2, 0, 2, 3]), "pass .reshape(-1, 3)"),
+    (lambda _: hizvk.Mesh(CORNERS, [[1, 2, 3], [1, 3, 4]]), "count from 1: subtract 1"),
+    (lambda _: hizvk.Mesh(CORNERS, [[0.0, 1.0, 2.0]]), "convert it with .astype(np.int64)"),
+    (lambda _: hizvk.Mesh.of("house.glb"), "read the file first"),
+    (
+        lambda device: device.occluders([CORNERS, [[0, 1, 2]]]),
+        "of arrays pass hizvk.Mesh(vertices, triangles)",
+    ),
+    # Objects that are made first.
+    (lambda device: culled(device, instances=BALLS), "by device.instances(bounds)"),
+    (lambda device: culled(device, pyramid=DEPTH), "by device.pyramid(depth, camera, kind=...)"),
+    (
+        lambda _: hizvk.visible((CORNERS, CORNERS), CAMERA, depth=DEPTH, kind="z"),
+        "pass hizvk.Boxes(*bounds) or hizvk.Spheres(*bounds)",
+    ),
+    (
+        lambda _: hizvk.visible(BALLS, CAMERA, depth=DEPTH, kind="z", tolerance=0.05),
+        "pass hizvk.Tolerance(abs=0.05)",
+    ),
+    # Depth and photographs.
+    (
+        lambda _: hizvk.visible(BALLS, CAMERA, depth=np.ones((6, 8, 3)), kind="z"),
+        "pass depth[..., 0]",
+    ),
+    (
+        lambda _: hizvk.visible(BALLS, CAMERA, depth=np.ones(48), kind="z"),
+        "pass depth.reshape(camera.size), if it is stored row by row",
+    ),
+    (
+        lambda _: hizvk.visible(BALLS, CAMERA, depth=DEPTH, kind="z", invalid=0),
+        "pass [0]",
+    ),
+    (lambda _: colour(np.zeros((6, 8, 3), np.uint16)), "pass image / 257.0"),
+    # Sweeps and pictures.
+    (
+        lambda _: hizvk.sweep(BALLS, (c for c in [CAMERA]), depths=[DEPTH], kind="z"),
+        "pass list(cameras)",
+    ),
+    (
+        lambda _: hizvk.sweep(BALLS, [CAMERA], depths=(d for d in [DEPTH]), kind="z"),
+        "pass list(depths), or a function that loads one",
+    ),
+    (
+        lambda device: culled(device).plot("seen.png"),
+        "a path goes to plot().savefig(path), or to save_html(path)",
+    ),
+    # Options and results.
+    (lambda device: culled(device, outputs="mask"), 'pass ["mask"]'),
+    (lambda _: hizvk.compare(np.array([True, False]), [1, 0]), "pass numpy.asarray(...) != 0"),
+]
+
+
+@pytest.mark.parametrize("number", range(len(WAYS)))
+def test_a_message_ends_with_the_way_out(device: hizvk.Device, number: int) -> None:
+    call, way = WAYS[number]
+    with pytest.raises((TypeError, ValueError)) as refused:
+        call(device)
+    assert str(refused.value).endswith(way) or f"; {way}" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: hizvk.Spheres([], []),
+        lambda: hizvk.Spheres((), 1.0),
+        lambda: hizvk.Boxes([], []),
+        lambda: hizvk.Boxes.from_corners([]),
+        lambda: hizvk.Points([]),
+        lambda: hizvk.OrientedBoxes([], [], []),
+        lambda: hizvk.OrientedBoxes.from_yaw([], [], [], up=(0, 0, 1)),
+        lambda: hizvk.OrientedBoxes.from_quaternions([], [], [], order="wxyz"),
+        lambda: hizvk.OrientedBoxes.from_corners([], order="carla"),
+    ],
+)
+def test_a_frame_without_objects_is_empty_lists(make: Callable[[], Any]) -> None:
+    seen = hizvk.visible(make(), CAMERA, depth=DEPTH, kind="z")
+    assert seen.shape == (0,)
+    assert seen.dtype == np.bool_
+
+
+def test_empty_lists_are_no_image_and_no_matrix() -> None:
+    with pytest.raises(ValueError, match=r"^depth: expected"):
+        hizvk.visible(BALLS, CAMERA, depth=[], kind="z")
+    with pytest.raises(ValueError, match=r"^k: expected"):
+        opencv([], np.eye(4))
+
+
+@pytest.mark.parametrize(
+    "bounds",
+    [
+        hizvk.Boxes([(1.0, 1.0, -5.0)], [(0.0, 2.0, -4.0)]),  # min above max
+        hizvk.Spheres([(0.0, 0.0, -5.0)] * 2, -1.0),
+        hizvk.Points([(np.nan, 0.0, -5.0)]),
+    ],
+)
+def test_bounds_that_are_all_invalid_are_told(bounds: Any) -> None:
+    with pytest.warns(hizvk.HizWarning, match=rf"^bounds: all {len(bounds)} are invalid"):
+        kept = hizvk.visible(bounds, CAMERA, depth=DEPTH, kind="z")
+    assert kept.all()
+
+
+def test_one_valid_instance_keeps_the_hint_away() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        kept = hizvk.visible(
+            hizvk.Spheres([(0.0, 0.0, -5.0), (0.0, 0.0, -20.0)], [-1.0, 1.0]),
+            CAMERA,
+            depth=DEPTH,
+            kind="z",
+        )
+    assert kept.tolist() == [True, False]
