@@ -1,5 +1,6 @@
 """What newcomers pass at first: it is taken, or the message ends with the way out."""
 
+import pickle
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -91,6 +92,15 @@ WAYS: list[tuple[Callable[[hizvk.Device], object], str]] = [
         lambda device: culled(device).plot("seen.png"),
         "a path goes to plot().savefig(path), or to save_html(path)",
     ),
+    (
+        lambda device: device.render_depth(hizvk.Mesh(CORNERS, [[0, 1, 2]]), CAMERA),  # type: ignore[arg-type]
+        "meshes become occluders by device.occluders(mesh)",
+    ),
+    (
+        lambda device: hizvk.visible_fraction(culled(device)),  # type: ignore[arg-type]
+        'pass the pixels of a cull with outputs=["pixels"]',
+    ),
+    (lambda device: hizvk.compare(culled(device), [True]), "pass the result's .mask"),
     # Options and results.
     (lambda device: culled(device, outputs="mask"), 'pass ["mask"]'),
     (lambda _: hizvk.compare(np.array([True, False]), [1, 0]), "pass numpy.asarray(...) != 0"),
@@ -130,6 +140,12 @@ def test_empty_lists_are_no_image_and_no_matrix() -> None:
         hizvk.visible(BALLS, CAMERA, depth=[], kind="z")
     with pytest.raises(ValueError, match=r"^k: expected"):
         opencv([], np.eye(4))
+
+
+def test_what_is_on_a_device_says_what_goes_to_other_processes(device: hizvk.Device) -> None:
+    for thing in (device, culled(device), device.instances(BALLS)):
+        with pytest.raises(TypeError, match=rf"^a {type(thing).__name__} stays in its process: "):
+            pickle.dumps(thing)
 
 
 @pytest.mark.parametrize(

@@ -539,6 +539,8 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
         array = array.astype(np.bool_)
     if array.dtype.kind != "b":
         way = "; pass numpy.asarray(...) != 0" if array.dtype.kind in "iuf" and array.ndim else ""
+        if hasattr(value, "mask") and hasattr(value, "verdicts"):
+            way = "; pass the result's .mask"
         raise TypeError(
             f"{name}: expected {expected}, got {describe(array if array.ndim else value)}{way}"
         )

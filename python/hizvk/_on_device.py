@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NoReturn, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ._core import Engine as CoreEngine
     from .adapter import Adapter
 
-__all__ = ["Allocated", "Maker", "OnDevice", "check_owner"]
+__all__ = ["Allocated", "Maker", "OnDevice", "StaysInProcess", "check_owner"]
 
 
 class Maker(Protocol):
@@ -46,7 +46,17 @@ _Inner = TypeVar("_Inner")
 _InnerWithBytes = TypeVar("_InnerWithBytes", bound=_HasBytes)
 
 
-class OnDevice(Generic[_Inner]):
+class StaysInProcess:
+    """What pickle refuses, with what to send instead."""
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            f"a {type(self).__name__} stays in its process: send bounds, cameras, meshes and NumPy "
+            "arrays such as a mask, and make a Device in the other process; hizvk.sweep does so"
+        )
+
+
+class OnDevice(StaysInProcess, Generic[_Inner]):
     """An object on a device: the compiled module's object, and the `Device` that made it."""
 
     def __init__(self, device: Maker, inner: _Inner) -> None:

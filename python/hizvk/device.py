@@ -17,7 +17,7 @@ from . import _arguments
 from ._core import Engine as CoreEngine
 from ._core import MeshTable as CoreMeshTable
 from ._core import TwoPasses as CoreTwoPasses
-from ._on_device import check_owner
+from ._on_device import StaysInProcess, check_owner
 from ._processes import driver_is_asked
 from ._types import Depths, FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
@@ -31,7 +31,15 @@ from .mesh import as_meshes
 from .options import Outputs, cull_options, cull_request
 from .progress import Progress, check_progress
 from .renewal import Source
-from .resources import A_PYRAMID, SOME_INSTANCES, DepthImage, Instances, Occluders, Pyramid
+from .resources import (
+    A_PYRAMID,
+    SOME_INSTANCES,
+    SOME_OCCLUDERS,
+    DepthImage,
+    Instances,
+    Occluders,
+    Pyramid,
+)
 from .result import CullResult
 from .samples import checked_samples
 from .temporal import PassResult, Temporal
@@ -61,7 +69,7 @@ __all__ = ["Device"]
 _TABLES_KEPT = 4
 
 
-class Device:
+class Device(StaysInProcess):
     """A device of the GPU, or of a software driver, with its queue and pipelines.
 
     Parameters
@@ -385,7 +393,7 @@ class Device:
         set-up" (2005): when one triangle covers a pixel.
         The step to whole surfaces is this library's own.
         """
-        _arguments.instance("occluders", occluders, Occluders, "Occluders of Device.occluders")
+        _arguments.instance("occluders", occluders, Occluders, *SOME_OCCLUDERS)
         check_owner("occluders", occluders, self)
         conservative = _arguments.flag("conservative", conservative)
         refinement = _arguments.integer("refinement", refinement, low=0, high=8)

@@ -81,7 +81,10 @@ def visible_fraction(
     in_depth = _arguments.flag("objects_in_depth", objects_in_depth)
     if not isinstance(pixels, np.ndarray) or pixels.dtype != PIXELS_DTYPE:
         got = _arguments.describe(pixels)
-        raise TypeError(f"pixels: expected an array of PIXELS_DTYPE, got {got}")
+        hint = ""
+        if hasattr(pixels, "visible_fraction"):
+            hint = '; pass the pixels of a cull with outputs=["pixels"]'
+        raise TypeError(f"pixels: expected an array of PIXELS_DTYPE, got {got}{hint}")
     hidden = np.asarray(pixels["hidden"], np.float64)
     others = np.asarray(pixels["inside"], np.float64)
     if not in_depth:

@@ -35,6 +35,10 @@ SOME_INSTANCES: Final = (
     "Instances of Device.instances",
     "; bounds become instances by device.instances(bounds)",
 )
+SOME_OCCLUDERS: Final = (
+    "Occluders of Device.occluders",
+    "; meshes become occluders by device.occluders(mesh)",
+)
 A_PYRAMID: Final = (
     "a Pyramid of Device.pyramid",
     "; depth becomes one by device.pyramid(depth, camera, kind=...)",
