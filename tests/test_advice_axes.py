@@ -116,6 +116,11 @@ def test_every_axis_has_measured_rows(device: hizvk.Device) -> None:
     assert found.best.triangles == found.best.kept * 10
     assert found.best.options.lod in (hizvk.LodByError(1.0), hizvk.LodByError(16.0))
     assert told[-1][0] == told[-1][1]
+    table = str(found).splitlines()
+    rows = [line for line in table if " %  " in line]
+    front = sum(one.on_front for one in found.candidates)
+    assert 10 <= len(rows) <= max(10, front + 1) < len(found.candidates)
+    assert f"    and {len(found.candidates) - len(rows)} more, in candidates" in table
     assert "one after the other, from the best so far: rasteriser (2), max_triangles (3)" in str(
         found
     )

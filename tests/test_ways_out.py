@@ -172,3 +172,14 @@ def test_one_valid_instance_keeps_the_hint_away() -> None:
             kind="z",
         )
     assert kept.tolist() == [True, False]
+
+
+def test_fractions_of_objects_that_the_image_does_not_hold(device: hizvk.Device) -> None:
+    seen = culled(device, outputs=["pixels"])
+    with pytest.warns(hizvk.HizWarning, match="pass objects_in_depth=False"):
+        assert seen.visible_fraction() == [0.0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert seen.visible_fraction(objects_in_depth=False) == [1.0]
+        hidden = device.instances(hizvk.Spheres([(0.0, 0.0, -20.0)], 0.5))
+        assert culled(device, instances=hidden, outputs=["pixels"]).visible_fraction() == [0.0]

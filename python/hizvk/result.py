@@ -7,6 +7,7 @@ Later reads get the same arrays, so they are read-only.
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from ._awaited import Awaited
 from ._core import Counts as CoreCounts
 from ._core import Culling as CoreCulling
 from ._processes import cached_property
+from .errors import HizWarning
 from .explanation import explanation_of
 from .options import MAX_LODS
 from .pictured import PicturedResult
@@ -232,8 +234,24 @@ class CullResult(PicturedResult, Awaited[CoreCulling]):
         ------
         TypeError, ValueError
             For another type, and if the cull was not asked for pixels.
+
+        Warns
+        -----
+        HizWarning
+            If no instance has a pixel of its own surface, although nothing hides some of them: then
+            the image most likely holds occluders alone.
         """
-        return visible_fraction(np.asarray(self.pixels), objects_in_depth=objects_in_depth)
+        pixels = np.asarray(self.pixels)
+        fraction = visible_fraction(pixels, objects_in_depth=objects_in_depth)
+        through = (pixels["open"] > 0) & (pixels["hidden"] == 0)
+        if objects_in_depth and through.any() and not pixels["inside"].any():
+            warnings.warn(
+                "objects_in_depth: the depth image holds no surface of any instance, so each "
+                "fraction is 0; if it holds occluders alone, pass objects_in_depth=False",
+                HizWarning,
+                stacklevel=2,
+            )
+        return fraction
 
     @cached_property
     def _counts(self) -> CoreCounts:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -13,10 +13,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Recommendation", "notes_on"]
 
+#: How many candidates a printed table shows at least, where there are as many.
+#: All of the Pareto front and the best are among them.
+ROWS: Final = 10
+
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """What `recommend` found; ``print`` shows it as a table."""
+    """What `recommend` found; ``print`` shows the best candidates as a table."""
 
     best: Candidate
     """The candidate to use; it is `Candidate.safe`."""
@@ -43,6 +47,18 @@ class Recommendation:
         """The Pareto front of time and instances kept, the fastest first."""
         return tuple(one for one in self.candidates if one.on_front)
 
+    def _shown(self) -> list[Candidate]:
+        """What the printed table has: the front, the best, and the fastest of the others."""
+        room = ROWS - sum(one.on_front or one is self.best for one in self.candidates)
+        shown = []
+        for one in self.candidates:
+            if one.on_front or one is self.best:
+                shown.append(one)
+            elif room > 0:
+                room -= 1
+                shown.append(one)
+        return shown
+
     def __str__(self) -> str:
         over = (
             "" if self.within_budget else " (over the budget, as all are that may be recommended)"
@@ -52,7 +68,8 @@ class Recommendation:
             "    ms per camera      kept     hides   unclear"
             "   (* the Pareto front; - not for what was asked)",
         ]
-        for one in self.candidates:
+        shown = self._shown()
+        for one in shown:
             share = 100.0 * one.kept / max(self.tested, 1)
             mark = "*" if one.on_front else " " if one.asked else "-"
             lines.append(
@@ -60,6 +77,8 @@ class Recommendation:
                 f"{one.hides:8,}  {one.unclear:8,}   {one}"
                 + ("" if one.triangles is None else f", {one.triangles:,} triangles")
             )
+        if len(shown) < len(self.candidates):
+            lines.append(f"    and {len(self.candidates) - len(shown)} more, in candidates")
         if self.axes:
             tried = (f"{name} ({len(rows) - 1})" for name, rows in self.axes.items())
             lines.append(f"one after the other, from the best so far: {', '.join(tried)}")
