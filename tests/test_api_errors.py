@@ -1,6 +1,6 @@
 """Bad arguments: every parameter of every public function has a test of its error's text.
 
-The tables are in api_bad_values.py.
+The tables are in bad_values/.
 A text has to start with the parameter's name, and `test_every_parameter_has_a_bad_value` compares
 the tables with the package, so that a new parameter without an entry fails.
 """
@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import hizvk
-from api_bad_values import EYE4, GL, MADE_BY_THE_PACKAGE, NAN, TABLES, Bad, K, camera, spheres
+from bad_values import EYE4, GL, MADE_BY_THE_PACKAGE, NAN, TABLES, Bad, K, camera, spheres
 
 
 def cases() -> Iterator[Any]:

@@ -2,7 +2,7 @@
 
 The outcome is a result or a named error, never a crash, and never a huge copy.
 
-The parameters, and valid arguments beside them, are those of api_bad_values.py.
+The parameters, and valid arguments beside them, are those of bad_values/.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import hizvk
-from api_bad_values import TABLES
+from bad_values import TABLES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
