@@ -456,7 +456,10 @@ impl Culling {
         let got = self.visible.outputs();
         Err(Error::mismatch(
             "outputs",
-            format!("expected a cull that was asked for {output}, got one with {got}"),
+            format!(
+                "expected a cull that was asked for {output}, got one with {got}; \
+                 name {output} among the cull's outputs"
+            ),
         ))
     }
 

@@ -413,7 +413,10 @@ impl ViewsCulling {
         let got = self.joined.any.outputs();
         Error::mismatch(
             "outputs",
-            format!("expected a cull that was asked for {output} of any view, got one with {got}"),
+            format!(
+                "expected a cull that was asked for {output} of any view, got one with {got}; \
+                 name {output} among the cull's outputs"
+            ),
         )
     }
 }
