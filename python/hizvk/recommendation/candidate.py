@@ -133,7 +133,10 @@ class Candidate:
         """
         _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
         if instances.kind != self.volume:
-            raise ValueError(f"instances: expected {self.volume}, got {instances.kind}")
+            raise ValueError(
+                f"instances: expected {self.volume}, got {instances.kind}; "
+                "upload the bounds that this candidate's volume names"
+            )
         if (occluders is None) == (depth is None):
             got = "neither" if occluders is None else "both"
             raise TypeError(f"occluders, depth: expected exactly one of them, got {got}")
