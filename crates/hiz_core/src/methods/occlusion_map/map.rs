@@ -62,9 +62,9 @@ impl OcclusionMap {
     /// The finest map has the camera's size, whose sides are powers of two; the text has 256x256.
     ///
     /// # Errors
-    /// - [`Error::Invalid`] for sides that are no powers of two, for options that do not fit them,
-    ///   and for a camera that float32 cannot hold.
-    /// - [`Error::OutOfMemory`].
+    /// - [`Error::Invalid`](crate::Error::Invalid) for sides that are no powers of two, for options
+    ///   that do not fit them, and for a camera that float32 cannot hold.
+    /// - [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(surface: &OccluderSurface, camera: &Camera, options: &MapOptions) -> Result<Self> {
         Self::planted(surface, camera, options, Planted::default())
     }
