@@ -189,7 +189,7 @@ def test_what_was_not_asked_for_is_refused(device: hizvk.Device) -> None:
     pyramid = device.pyramid(np.full(SIZE, 1.0), CAMERA, kind="z")
     boxes = device.instances(hizvk.Boxes(*crowd(3, 5)))
     seen = device.cull(boxes, CAMERA, pyramid)
-    with pytest.raises(ValueError, match="asked for pixels, .*; name pixels among"):
+    with pytest.raises(ValueError, match=r"asked for pixels, .*; name pixels among"):
         _ = seen.pixels
     with pytest.raises(ValueError, match="pixels: expected False beside several cameras"):
         device.cull(boxes, [CAMERA], [pyramid], outputs=["pixels"])
