@@ -5,7 +5,7 @@ use crate::pyramid::PyramidUniform;
 
 /// The limits that the shaders and their bindings need, each with what the device has.
 ///
-/// `tests/validation.rs` runs everything on a device with exactly these limits.
+/// `tests/validation/limits.rs` runs everything on a device with exactly these limits.
 /// It also tries devices where one limit is lower by one.
 pub(super) fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
     macro_rules! limits {
