@@ -11,7 +11,7 @@ use crate::{SAMPLED, SIDE, STANDARD, TWO_BOXES, World, plain, run};
 
 /// A world whose wall is reduced, with or without an atlas, and culled once.
 /// So its pyramid keeps bindings.
-fn culled(mut world: World, atlas: AtlasUse) -> (World, wgpu::Texture) {
+pub(crate) fn culled(mut world: World, atlas: AtlasUse) -> (World, wgpu::Texture) {
     let options = PyramidOptions { atlas, ..PyramidOptions::default() };
     world.pyramid = world.context.create_pyramid(world.camera.size(), &options).unwrap();
     let mut encoder = world.encoder();
