@@ -482,8 +482,12 @@ pub(crate) fn cull_boxes_module(
     (pass, is_top): (FramePass, bool),
 ) -> Source {
     let shared = [wgsl!("instances/tier"), wgsl!("instances/groups"), wgsl!("output/statistics")];
-    let which = if is_top { wgsl!("cull/cull_groups") } else { wgsl!("cull/cull_children") };
-    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_box"), which]].concat();
+    let which: &[File] = if is_top {
+        &[wgsl!("cull/cull_groups")]
+    } else {
+        &[wgsl!("cull/parents"), wgsl!("cull/cull_children")]
+    };
+    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_box")], which].concat();
     unexplained(store, BoundsKind::Box, decision, &entry)
 }
 
@@ -519,7 +523,7 @@ fn members_module(
         wgsl!("output/report"),
         wgsl!("instances/groups"),
     ];
-    let last = [wgsl!("cull/survivors"), entry];
+    let last = [wgsl!("cull/parents"), entry];
     let files = [&shared[..], &emit.files(), pass.member_files(), &last].concat();
     unexplained(store, kind, decision, &files)
 }
