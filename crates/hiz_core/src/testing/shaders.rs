@@ -182,6 +182,8 @@ fn snippets() -> Source {
 
 #[cfg(test)]
 pub(in crate::testing) mod tests {
+    use std::collections::HashSet;
+
     use super::*;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
@@ -197,6 +199,27 @@ pub(in crate::testing) mod tests {
             .validate(&module)
             .unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
         module
+    }
+
+    /// The first modules of the list that have every file between them.
+    ///
+    /// What a file declares is the same in all of its modules.
+    /// So declarations are looked at here, instead of in every module again.
+    pub(in crate::testing) fn covering() -> Vec<(Source, naga::Module)> {
+        let mut seen = HashSet::new();
+        let mut has_new = |source: &Source| {
+            source.files().iter().fold(false, |has_new, file| seen.insert(file.path) || has_new)
+        };
+        let sources = all().into_iter().map(|(_, source)| source);
+        sources.filter(&mut has_new).map(|s| (s.clone(), parse(&s.text()))).collect()
+    }
+
+    #[test]
+    fn every_file_is_in_a_module() {
+        let covered: HashSet<&str> =
+            covering().iter().flat_map(|(source, _)| source.files()).map(|f| f.path).collect();
+        let left_out: Vec<_> = files().into_iter().filter(|(p, _)| !covered.contains(p)).collect();
+        assert!(left_out.is_empty(), "{left_out:?}");
     }
 
     #[test]
