@@ -5,6 +5,9 @@ import os
 import numpy as np
 
 import hizvk
+import hizvk.measuring.configuration
+import hizvk.measuring.spread
+import hizvk.recommendation
 
 from .shared import (
     BOUNDS,
@@ -38,6 +41,14 @@ from .shared import (
     rendered,
     spheres,
 )
+
+
+def recommendation() -> hizvk.Recommendation:
+    ms = hizvk.measuring.spread.spread(np.ones((1, 1)))
+    configuration = hizvk.measuring.configuration.Configuration()
+    best = hizvk.recommendation.Candidate(configuration, ms, ms, 1, True)
+    return hizvk.Recommendation(best, True, (best,), 1, "no adapter")
+
 
 TABLES: dict[str, Table] = {
     "CullOptions": Table(lambda _: (hizvk.CullOptions, {}), OPTIONS),
@@ -233,6 +244,10 @@ TABLES: dict[str, Table] = {
                 (None, TypeError, "got None"),
             ],
         },
+    ),
+    "Recommendation.table": Table(
+        lambda _: (recommendation().table, {}),
+        {"most": [(0, ValueError, "got int 0"), ("all", TypeError, "got str 'all'")]},
     ),
     "CullResult.hints": Table(lambda device: (device.cull(**cull_arguments(device)).hints, {}), {}),
     "CullResult.bin": Table(
