@@ -43,6 +43,12 @@ from .shared import (
 )
 
 
+def several(device: hizvk.Device) -> hizvk.ViewsResult:
+    arguments = cull_arguments(device)
+    views = {name: [arguments.pop(name)] for name in ("camera", "pyramid")}
+    return device.cull(**views, **arguments)
+
+
 def recommendation() -> hizvk.Recommendation:
     ms = hizvk.measuring.spread.spread(np.ones((1, 1)))
     configuration = hizvk.measuring.configuration.Configuration()
@@ -272,6 +278,10 @@ TABLES: dict[str, Table] = {
     ),
     "CullResult.plot": Table(
         lambda device: (device.cull(**cull_arguments(device)).plot, {}), DRAWN
+    ),
+    "ViewsResult.plot": Table(
+        lambda device: (several(device).plot, {}),
+        {name: DRAWN[name] for name in ("bounds", "most", "unit")},
     ),
     "CullResult.save_html": Table(
         lambda device: (device.cull(**cull_arguments(device)).save_html, {"path": os.devnull}),
