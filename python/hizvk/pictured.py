@@ -133,10 +133,8 @@ class PicturedPyramid(_Shown):
         ----------
         end : {"farthest", "nearest"}, optional
             As for `level`.
-        kind : {"z", "distance", "ndc", "reversed_ndc"}, optional
-            What is shown; None: view depth, or NDC depth where the camera does not say view depth.
-        unit : str
-            The unit of world positions, for the scale.
+        kind, unit : optional
+            As for `DepthImage.plot`.
 
         Returns
         -------
