@@ -22,6 +22,7 @@ import numpy as np
 
 import hizvk
 
+from ..commands import page
 from ..scenes.scene import box_mesh
 from ..scenes.sunlit import sunlit
 
@@ -179,16 +180,13 @@ def _by_rectangle(
 
 def table(rows: list[Row]) -> str:
     """The rows as a Markdown table."""
-    lines = [
-        "| view | casters | needed | frustum alone | behind alone | ours | lost |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {row.view} | {row.casters:,} | {row.needed:,} | {row.frustum:,} | {row.behind:,} "
-        f"| {row.ours:,} | {row.lost} |"
-        for row in rows
-    ]
-    return "\n".join(lines)
+    head = "view | casters | needed | frustum alone | behind alone | ours | lost"
+    return "\n".join(page.table(head, (_cells(row) for row in rows)))
+
+
+def _cells(row: Row) -> list[str]:
+    counts = row.casters, row.needed, row.frustum, row.behind, row.ours, row.lost
+    return [row.view, *(f"{count:,}" for count in counts)]
 
 
 def main() -> None:

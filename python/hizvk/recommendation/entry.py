@@ -162,8 +162,10 @@ def recommend(
         Of these, the one whose lists draw the fewest triangles is recommended.
         None: an error of one pixel if `meshes` have errors, else halves of the size.
     max_seconds : float, optional
-        After so long no further repetition and no further axis begins; None: no limit.
-        The first candidates are always measured once.
+        About how long it may take; None: no limit.
+        No row begins that would not be done by then, as long as the last such row took.
+        One row is always measured, and some of what it culls is checked.
+        `Recommendation.notes` says what was left out.
     progress : bool or function, optional
         As everywhere (`hizvk.progress`); a step is a cull, a depth image or a check.
     **keywords

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..resources import DepthImage, Instances, Occluders, Pyramid
 
-__all__ = ["DepthSource", "Times", "number_of_steps", "time_all"]
+__all__ = ["SLOW_MS", "DepthSource", "Times", "number_of_steps", "once", "time_all"]
 
 #: A depth image that takes longer than this is not rendered again.
 SLOW_MS: Final = 200.0
@@ -140,6 +140,21 @@ def number_of_steps(
     return once * len(views) * (repetitions + 1)
 
 
+def once(
+    device: Device,
+    instances: Instances,
+    pyramid: Pyramid,
+    one: Configuration,
+    base: CullOptions,
+    meshes: Sequence[MeshLods] | None,
+) -> tuple[npt.NDArray[np.bool_], float, float, int | None]:
+    """One cull: mask, milliseconds of cull and read, and the triangles that its lists draw."""
+    if one.lod is None:
+        return *cull(device, instances, pyramid, one, base), None
+    assert meshes is not None
+    return drawn_triangles(device, instances, pyramid, one.options(base), meshes)
+
+
 def time_all(
     chosen: Sequence[Configuration],
     volumes: Mapping[str, Instances],
@@ -174,18 +189,12 @@ def time_all(
                 number = (turn + repetition * len(chosen) // rounds + k) % len(chosen)
                 one = chosen[number]
                 instances, pyramid = volumes[one.volume], made[one.depth][0]
-                if one.lod is None:
-                    mask, *both = cull(source.device, instances, pyramid, one, base)
-                else:
-                    assert meshes is not None
-                    mask, *both, drawn = drawn_triangles(
-                        source.device, instances, pyramid, one.options(base), meshes
-                    )
-                    if repetition == 0:
-                        triangles[number] = (triangles[number] or 0) + drawn
+                mask, *both, drawn = once(source.device, instances, pyramid, one, base, meshes)
                 culling[number, repetition, k], reading[number, repetition, k] = both
                 if repetition == 0:
                     masks[number].append(mask)
+                    if drawn is not None:
+                        triangles[number] = (triangles[number] or 0) + drawn
                 steps.step("timing")
     counted = {variant: ms[1:rounds] for variant, ms in depth_ms.items()}
     return Times(chosen, counted, culling[:, 1:rounds], reading[:, 1:rounds], masks, triangles)
