@@ -42,6 +42,7 @@ from .samples import checked_samples
 from .temporal import PassResult, Temporal
 from .timing import StageTimes
 from .views import ViewsResult, among_of
+from .warming import checked_more
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -472,11 +473,13 @@ class Device(StaysInProcess):
             - ``"distance"``: distance to the eye along the pixel's ray in world units.
 
             "No data" counts as infinitely far.
-            It is NaN, infinity, the numbers of `invalid`, and what lies outside the camera's
-            planes.
+            It is NaN, the numbers of `invalid`, and what lies outside the camera's planes.
             For ``"z"`` and ``"distance"`` it is zero and negative numbers, too.
             An orthographic camera with ``near < 0`` is the exception: it sees behind its eye, so
             negative numbers and a float zero are depth.
+
+            Infinity is far, too: for ``"z"`` and ``"distance"`` it means that nothing is there.
+            List it in `invalid` where it means "no data".
         scale : float
             World units of one step, for the kinds ``"z"`` and ``"distance"``: 0.001 for
             millimetres.
@@ -518,6 +521,8 @@ class Device(StaysInProcess):
               Culls of shadow casters take it, and no others do.
 
             The ends differ in what "no data" counts as: far in the farthest, near in the nearest.
+            For ``"z"`` and ``"distance"`` infinity and what lies beyond the far plane are far in
+            both: they are farther than all that is in the view.
 
             For ``"receivers"`` background is left out: pixels with exactly the depth of far, which
             is what a depth buffer is cleared to.
@@ -940,6 +945,10 @@ class Device(StaysInProcess):
         *,
         occluders: Occluders | None = None,
         levels: Levels = None,
+        depths: Depths = "farthest",
+        two_passes: bool = False,
+        samples: int = 1,
+        views: int = 1,
         **keywords: Unpack[CullKeywords],
     ) -> None:
         """Compiles what frames with these options need, before the first of them.
@@ -969,8 +978,14 @@ class Device(StaysInProcess):
         occluders : Occluders, optional
             Of this device; then the depth of the frames is rendered (`render_depth`).
             None: it comes from arrays.
-        levels : int or pair of int, optional
+        levels, depths
             As for `pyramid`.
+        two_passes : bool
+            Whether frames have two passes (`temporal`), with `options` in the late one.
+        samples : int
+            How many samples per pixel the arrays of depth have: 1, 2, 4, 8 or 16.
+        views : int
+            How many cameras one call of `cull` has, 1 to 256.
 
         Raises
         ------
@@ -1001,16 +1016,19 @@ class Device(StaysInProcess):
             _arguments.instance("occluders", occluders, Occluders, expected)
             check_owner("occluders", occluders, self)
         stored = _arguments.stored_levels("levels", levels)
-        options, outputs = cull_request(options, outputs, keywords)
+        _arguments.choice("depths", depths, words(Depths))
         drawn = None if occluders is None else occluders._inner
+        more = checked_more(two_passes, samples, views, is_drawn=drawn is not None)
+        options, outputs = cull_request(options, outputs, keywords)
         self._engine.warm_up(
             instances._inner,
             camera._inner,
             drawn,
-            stored,
+            (stored, depths),
             options,
             outputs,
             self._mesh_table(outputs.meshes),
+            more,
         )
 
     def _mesh_table(self, meshes: Sequence[MeshLods] | None) -> CoreMeshTable | None:

@@ -478,6 +478,7 @@ TABLES: dict[str, Table] = {
             "kind": KIND,
             "scale": SCALE,
             "invalid": INVALID,
+            "tolerance": TOLERANCE,
             "coverage": COVERAGE,
             "own_depth": [
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),

@@ -62,6 +62,17 @@ impl Decision {
 }
 
 impl CullKey {
+    /// The key of the tests of instances, for what they report.
+    ///
+    /// What surely shows is kept, and so is what may show.
+    /// Where nothing tells them apart, the nearest depths need not be read.
+    /// A descent reads them all the same: it ends where an instance surely shows.
+    pub(super) fn of_instances(self, report: &ReportKey) -> Self {
+        let descends = self.descent || self.fit_volume || self.decision == Decision::Shadow;
+        let is_told = report.verdicts || report.statistics;
+        Self { nearest: self.nearest && (is_told || descends), ..self }
+    }
+
     /// The key of a pass that reads no depth.
     pub(crate) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
         Self {
