@@ -41,6 +41,8 @@ pub(crate) enum Decision {
     Seen,
     /// Whether its shadow may be seen.
     Shadow,
+    /// Whether it may lie in the view, whatever hides it.
+    InView,
 }
 
 impl Decision {
@@ -57,6 +59,9 @@ impl Decision {
                 wgsl!("cull/shadow"),
                 wgsl!("cull/shadow_classify"),
             ],
+            Self::InView => {
+                &[wgsl!("cull/supporting_planes"), wgsl!("cull/unoccluded"), wgsl!("cull/in_view")]
+            }
         }
     }
 }
@@ -163,6 +168,14 @@ impl FramePass {
             Self::Alone => SURVIVOR_BINDINGS,
             Self::Early(_) => EARLY_SURVIVOR_BINDINGS,
             Self::Late => LATE_SURVIVOR_BINDINGS,
+        }
+    }
+
+    /// What an early pass decides about a candidate: sizes need its rectangle.
+    pub(crate) fn decision(self) -> Decision {
+        match self {
+            Self::Early(Candidates::History | Candidates::Given) => Decision::InView,
+            Self::Early(Candidates::Size) | Self::Alone | Self::Late => Decision::Seen,
         }
     }
 

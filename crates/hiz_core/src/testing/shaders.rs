@@ -118,13 +118,15 @@ pub(super) fn all() -> Vec<(String, Source)> {
         );
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
-    // The sets of an early pass differ in a constant.
-    let early = (DepthStore::Atlas, FramePass::Early(Candidates::History));
+    // The sets of an early pass differ in a constant, and in what is decided.
+    let early = [Candidates::History, Candidates::Size]
+        .map(|candidates| (DepthStore::Atlas, FramePass::Early(candidates)));
     let passes = [FramePass::Alone, FramePass::Late];
     let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
-    for (store, pass) in passes.chain([early]) {
+    for (store, pass) in passes.chain(early) {
+        let decision = pass.decision();
         for (name, is_top) in [("cull_groups", true), ("cull_children", false)] {
-            let module = cull_boxes_module(store, Decision::Seen, (pass, is_top));
+            let module = cull_boxes_module(store, decision, (pass, is_top));
             all.push((format!("{name} {store:?} {pass:?}"), module));
         }
         let emits: &[_] = if pass == FramePass::Alone { &EMITS } else { &EMITS_OF_TWO };
@@ -133,8 +135,8 @@ pub(super) fn all() -> Vec<(String, Source)> {
         {
             let named = |name: &str| format!("{name} {way} {store:?} {pass:?} {kind:?}");
             let of = (emit, pass);
-            all.push((named("cull"), flat_module(store, kind, Decision::Seen, of)));
-            let members = cull_members_module(store, kind, Decision::Seen, of);
+            all.push((named("cull"), flat_module(store, kind, decision, of)));
+            let members = cull_members_module(store, kind, decision, of);
             all.push((named("cull_members"), members));
             if matches!(pass, FramePass::Early(_)) {
                 continue;
@@ -274,7 +276,7 @@ pub(in crate::testing) mod tests {
                 1,
                 "the depth that slack has moved"
             );
-            assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
+            assert_eq!(calls(&module, "surely_outside", "bar"), 2, "-A and 1 - A");
             assert_eq!(calls(&module, "surely_in_front", "bar"), 1, "d - A");
             assert_eq!(
                 calls(&module, "revealing_depth", "bar"),

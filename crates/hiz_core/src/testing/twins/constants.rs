@@ -142,6 +142,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("cull/shadow_classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
+        ("cull/in_view", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
         ("output/join", "WORKGROUP", int(views::WORKGROUP)),
         ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
@@ -497,8 +498,10 @@ fn a_cull_sets_every_override() {
             decision: Decision::Seen,
         };
         let alone = EMITS.map(|emit| (emit, FramePass::Alone));
-        let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
+        let early = [Candidates::History, Candidates::Size].map(FramePass::Early);
+        let of_two = early
             .into_iter()
+            .chain([FramePass::Late])
             .flat_map(|pass| EMITS_OF_TWO.map(|emit| (emit, pass)));
         for ((way, emit), pass) in alone.into_iter().chain(of_two) {
             let report = ReportKey {
@@ -511,7 +514,7 @@ fn a_cull_sets_every_override() {
             };
             let set = classify_constants(&key).into_iter().chain(report_constants(&report));
             let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-            let module = parse(&flat_module(store, kind, Decision::Seen, (emit, pass)).text());
+            let module = parse(&flat_module(store, kind, pass.decision(), (emit, pass)).text());
             let declared: BTreeSet<String> =
                 module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
             assert_eq!(set, declared, "{kind:?} {way} {pass:?}");
