@@ -279,6 +279,15 @@ def test_every_round_has_every_way_once_and_begins_with_another() -> None:
     assert ms["a"].tolist() == [first + 1, first + 6, first + 8]
 
 
+def test_a_part_that_judges_nothing_passes() -> None:
+    """The quick part of scale has rows alone."""
+    told = found()
+    told.instance_counts.append(figures.InstanceCount(9, 1, 1.0, 1.0, 1.0, 9, 1.0, 9))
+    assert told.passed
+    told.errors.append(figures.Error("p", "ours", 9, 3, 3, 1, 0, 2, promises=True))
+    assert not told.passed
+
+
 def test_a_broken_promise_fails_and_a_missed_target_does_not() -> None:
     told = found()
     assert not told.passed  # nothing was measured

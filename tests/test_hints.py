@@ -82,6 +82,7 @@ def test_that_all_is_hidden_may_be_right(device: hizvk.Device) -> None:
         (text,) = asked(device, bounds, depth)
         assert text.startswith("bounds, depth: all 40 in view are hidden (their middles at a view")
         assert "check kind, scale and the units of the positions" in text
+        assert ("the image at 2 everywhere)" in text) == (depth.min() == depth.max())
     # One that is hidden, and many outside, are nothing to speak of.
     one = hizvk.Spheres([(0.0, 0, -3000.0), (0.0, 0, 5.0)], 0.1)
     assert said(one, room(2.0, 2.0)) == []

@@ -99,16 +99,17 @@ def all_are_hidden(
     if found is None:
         return ()
     count, instances, image = found
+    both = _both(found, "everywhere" if (depth == image).all() else "in the median")
     if instances >= APART * image:
         return (
             f"bounds, depth: all {count:,} in view are hidden, and they are "
-            f"{instances / image:,.0f} times as far away as the depth image ({_both(found)}); if "
+            f"{instances / image:,.0f} times as far away as the depth image ({both}); if "
             "that is not meant, bring both to the same units, by scale or by the positions",
         )
     if not asked:
         return ()
     return (
-        f"bounds, depth: all {count:,} in view are hidden ({_both(found)}); if that is not meant, "
+        f"bounds, depth: all {count:,} in view are hidden ({both}); if that is not meant, "
         "check kind, scale and the units of the positions",
     )
 
@@ -136,7 +137,8 @@ def none_is_hidden(
     what = "whole numbers without scale count as world units, and " if is_whole else ""
     return (
         f"depth, scale: {what}nothing is hidden, because the depth image is "
-        f"{image / instances:,.0f} times as far away as the {count:,} in view ({_both(found)}); if "
+        f"{image / instances:,.0f} times as far away as the {count:,} in view "
+        f"({_both(found, 'in the median')}); if "
         "it is in millimetres and positions are in metres, pass scale=0.001",
     )
 
@@ -155,9 +157,12 @@ def _medians(camera: Camera, middles: _Doubles, depth: _Doubles) -> tuple[int, f
     return len(seen), float(np.median(seen)), float(np.median(known))
 
 
-def _both(found: tuple[int, float, float]) -> str:
+def _both(found: tuple[int, float, float], where: str) -> str:
     _, instances, image = found
-    return f"their middles at a view depth of {instances:.4g}, the image at {image:.4g}, in medians"
+    return (
+        f"their middles at a view depth of {instances:.4g} in the median, the image at "
+        f"{image:.4g} {where}"
+    )
 
 
 def whole_without_scale(given: Any) -> bool:
