@@ -413,6 +413,7 @@ fn the_first_frame_of_an_engine_with_more_passes_makes_no_pipeline() {
                 passes.early(&camera, set).unwrap().mask().unwrap();
             }
             passes.late(&camera, &pyramid, &options).unwrap().mask().unwrap();
+            passes.early(&camera, EarlyMask::LastVisible).unwrap().mask().unwrap();
         }
         let each = Outputs { mask: true, verdicts: outputs.verdicts, ..Outputs::NONE };
         let outputs = ViewsOutputs { each, any: outputs };
