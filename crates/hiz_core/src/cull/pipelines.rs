@@ -456,6 +456,7 @@ pub(crate) fn decision_module(
             wgsl!("cull/certificate"),
             wgsl!("output/verdict"),
             wgsl!("cull/outcome"),
+            wgsl!("cull/decision"),
             wgsl!("pyramid/levels"),
         ],
         &store.files(),

@@ -140,9 +140,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/record_layout", "ABSENT_CENTER_BITS", bits(ABSENT_CENTER)),
         ("instances/record_layout", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
-        ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
-        ("cull/shadow_classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
-        ("cull/in_view", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
+        ("cull/decision", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
         ("output/join", "WORKGROUP", int(views::WORKGROUP)),
         ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
@@ -187,7 +185,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
 /// What is known of those that carry a proof is in `constants_cover_what_is_counted`.
 const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
-    ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
+    ("cull/decision", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
@@ -209,7 +207,6 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/pixels_planes", &["FACE_PLANES", "DEPTH_PLANES", "OUTLINE_PLACES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
     ("cull/shadow", &["NO_FACE"]),
-    ("cull/shadow_classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     (
         "pyramid/receiver_mask",
@@ -385,7 +382,7 @@ fn constants_cover_what_is_counted() {
     assert!(number("instances/bounds_sphere", "SQUARES_FLOOR") >= two_to(-100));
     assert!(number("instances/bounds_sphere", "AXES") >= 3.0);
     // The margin is at least 2^-70; a ratio may not overflow.
-    assert!(number("cull/classify", "LEAST_W") >= two_to(-66));
+    assert!(number("cull/decision", "LEAST_W") >= two_to(-66));
     let planes = |name: &str| number("cull/supporting_planes", name);
     // Six roundings of a texel's comparison, and what is flushed there.
     assert!(planes("TEXEL_ULPS") >= 6.0);
