@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from . import _arguments
 from ._processes import per_process
 from .bounds import Bounds, Points, are_points, as_arrays
+from .building import check_side, of_arrays
 from .camera import Camera
 from .depth import checked_image
 from .device import Device, maker_of
@@ -165,14 +166,14 @@ def visible(
 
     else:
         if device is not None:
-            device._check_side(camera)
+            check_side(device, camera)
         image = checked_image("depth", depth, camera, kind, scale, invalid, tolerance)
         maker = device = default_device() if device is None else device
         mask, counts = device._engine.cull_once(kind_and_arrays, camera._inner, image, options)
         stored = _arguments.stored_levels("levels", None)
 
         def pyramid_again() -> Pyramid:
-            return maker._pyramid_of(image, camera, stored)
+            return of_arrays(maker, image, camera, stored)
 
         depths = sampled(image, camera)
 

@@ -105,6 +105,7 @@ def colour_points(
     weight : "equal" or "near"
         ``"equal"``: each view that sees a point counts alike.
         ``"near"``: by the inverse square of its view depth.
+        An orthographic camera shows nothing larger from nearby, so there it is as ``"equal"``.
     device : Device, optional
         None: the default device of `visible`.
     options : CullOptions, optional

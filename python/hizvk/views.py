@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["ViewsResult", "among_of", "pairs"]
 
 #: As `MAX_VIEWS` of the engine.
-_MOST_VIEWS = 256
+MOST_VIEWS = 256
 
 
 class ViewsResult(PicturedViews, Awaited[CoreViews]):
@@ -170,8 +170,8 @@ def pairs(
                 raise TypeError(f"{name}[{number}]: expected a {kind.__name__}, got {got}")
             if isinstance(one, Pyramid):
                 check_owner(f"{name}[{number}]", one, device)
-        if not 1 <= len(given) <= _MOST_VIEWS:
-            raise ValueError(f"{name}: expected 1 to {_MOST_VIEWS} views, got {len(given)}")
+        if not 1 <= len(given) <= MOST_VIEWS:
+            raise ValueError(f"{name}: expected 1 to {MOST_VIEWS} views, got {len(given)}")
     assert isinstance(cameras, Sequence)
     assert isinstance(pyramids, Sequence)
     if len(cameras) != len(pyramids):

@@ -8,7 +8,7 @@
 // What is used here and defined elsewhere:
 //
 // - `certificate.wgsl`: `Value`, `value_of`, `errors_of`, `error_bound`, `surely_above`, `_below`
-//   and `_beyond`
+//   and `_outside`
 // - `view.wgsl`: `view`, `bar`
 // - `supporting_planes.wgsl`: `Projected`, `surely_clear`
 // - `outcome.wgsl`, `../output/verdict.wgsl`: `Outcome`, stages, verdicts
@@ -157,14 +157,11 @@ fn classify(i: u32) -> Outcome {
     let y = value_of(view.y, errors.y, volume);
     let z = value_of(view.z, errors.z, volume);
     let w = value_of(view.w, errors.w, volume);
-    let a = view.z_slope;
 
     // 1. Is it outside one of the six planes of the frustum?
     out.stage = AT_FRUSTUM;
     out.verdict = OUTSIDE;
-    let border = view.half_size + view.reach;
-    if surely_beyond(x, border.x, w) | surely_beyond(y, border.y, w)
-        | surely_below(z, bar(-a), w) | surely_above(z, bar(1.0 - a), w) {
+    if surely_outside(x, y, z, w) {
         return out;
     }
 

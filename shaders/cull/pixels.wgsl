@@ -12,11 +12,11 @@
 // What is used here and defined elsewhere:
 //
 // - `pixels_planes.wgsl`: `PixelPlanes`, `pixel_planes`
-// - `pixels_row_*.wgsl`: `texel_row`
+// - `pixels_row_*.wgsl`: `texel_row`, `near_pixel_row`
 // - `classify.wgsl`: `pixel_interval`, `between_samples`, `inside_block`
 
 // True: a pixel of level 0 stands for all that its surface shows.
-// False: it is the farthest of several samples, which says nothing about what is behind the volume.
+// False: it is the farthest of several samples, and only the nearest says what is behind the volume.
 override ONE_SAMPLE: bool;
 // True: set the bit of each instance that may show in more than a negligible number of pixels.
 override SHOWN: bool;
@@ -43,6 +43,8 @@ const ROW_BITS: u32 = 4u;
 const ROW_MASK: u32 = (1u << ROW_BITS) - 1u;
 // More texels than any level has.
 const NO_BORDER: u32 = 0xffffffffu;
+// No depth: it says nothing.
+const UNKNOWN_BITS: u32 = 0xffffffffu;
 
 // Twin: `PixelCounts` in `crates/hiz_core/src/output/pixels.rs`.
 struct PixelCounts {
@@ -161,9 +163,6 @@ fn sure_of(
         hidden, open);
 }
 
-// No depth: it says nothing.
-const UNKNOWN_BITS: u32 = 0xffffffffu;
-
 // The nearest depths of four texels, of which `raw` are the farthest.
 fn nearest_of(level: u32, at: vec2<u32>, raw: vec4<u32>) -> vec4<u32> {
     var near = vec4<u32>(UNKNOWN_BITS);
@@ -173,7 +172,7 @@ fn nearest_of(level: u32, at: vec2<u32>, raw: vec4<u32>) -> vec4<u32> {
     if ONE_SAMPLE {
         near = select(near, raw, level == 0u);
     } else if level == 0u {
-        near = vec4<u32>(UNKNOWN_BITS);
+        near = near_pixel_row(at.x, at.y);
     }
     return near;
 }
@@ -325,10 +324,7 @@ fn prepare(i: u32, planes: ptr<function, PixelPlanes>) -> Prepared {
     let y = value_of(view.y, errors.y, volume);
     let z = value_of(view.z, errors.z, volume);
     let w = value_of(view.w, errors.w, volume);
-    let a = view.z_slope;
-    let border = view.half_size + view.reach;
-    if surely_beyond(x, border.x, w) | surely_beyond(y, border.y, w)
-        | surely_below(z, bar(-a), w) | surely_above(z, bar(1.0 - a), w) {
+    if surely_outside(x, y, z, w) {
         return answered(none);
     }
     let w_min = w.center - support(w.half) - error_bound(w, 0.0, w);

@@ -47,14 +47,31 @@ fn sanitized(bits: u32) -> u32 {
     return select(flushed, far_bits(), outside);
 }
 
+fn sanitized4(v: vec4<u32>) -> vec4<u32> {
+    return vec4<u32>(sanitized(v.x), sanitized(v.y), sanitized(v.z), sanitized(v.w));
+}
+
 // The same for the nearest depth: what is no depth is near.
 fn sanitized_near(bits: u32) -> u32 {
     let outside = bits > ONE_BITS && bits != NEGATIVE_ZERO_BITS;
     return select(sanitized(bits), near_bits(), outside);
 }
 
+fn sanitized_near4(v: vec4<u32>) -> vec4<u32> {
+    return vec4<u32>(
+        sanitized_near(v.x), sanitized_near(v.y), sanitized_near(v.z), sanitized_near(v.w));
+}
+
 fn farthest(a: u32, b: u32) -> u32 {
     return select(max(a, b), min(a, b), REVERSED);
+}
+
+// The same of four pairs.
+fn farthest_each(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    if REVERSED {
+        return min(a, b);
+    }
+    return max(a, b);
 }
 
 fn farthest4(v: vec4<u32>) -> u32 {
@@ -63,6 +80,13 @@ fn farthest4(v: vec4<u32>) -> u32 {
 
 fn nearest(a: u32, b: u32) -> u32 {
     return select(min(a, b), max(a, b), REVERSED);
+}
+
+fn nearest_each(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    if REVERSED {
+        return max(a, b);
+    }
+    return min(a, b);
 }
 
 fn nearest4(v: vec4<u32>) -> u32 {

@@ -459,7 +459,7 @@ TABLES: dict[str, Table] = {
                 (
                     np.array([6, 1], dtype=np.uint8),
                     ValueError,
-                    "codes of hizvk.reference.unoccluded (5, 6, 3, 4), got 1",
+                    "codes of hizvk.reference.unoccluded (3, 4, 5, 6), got 1",
                 ),
                 (None, TypeError, "got None"),
             ],
@@ -478,6 +478,7 @@ TABLES: dict[str, Table] = {
             "kind": KIND,
             "scale": SCALE,
             "invalid": INVALID,
+            "tolerance": TOLERANCE,
             "coverage": COVERAGE,
             "own_depth": [
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),

@@ -33,6 +33,7 @@ REPORTS: Final = {
     "occluders": "what is lost with fewer or simpler occluders",
     "maps": "hierarchical occlusion maps beside the cull",
     "tiling": "coverage bits in BSP order beside depth tiles",
+    "shadows": "shadow casters that are needed, and that a cull keeps",
     "texts": "what published tests lose, and their time",
 }
 

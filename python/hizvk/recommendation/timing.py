@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from .. import _arguments
+from ..building import of_arrays
 from ..depth import DepthArray
 from ..measuring.configuration import DepthVariant
 from ..measuring.spread import spread
@@ -83,7 +84,7 @@ class DepthSource:
             watch = Stopwatch(self.device)
             stored = _arguments.stored_levels("levels", variant.levels)
             image, view = self._images[k], self.views[k]
-            pyramid = self.device._pyramid_of(image, view, stored, depths=variant.depths)
+            pyramid = of_arrays(self.device, image, view, stored, depths=variant.depths)
             return pyramid, watch.lap()
         depth, took = self._depth(variant, k)
         watch = Stopwatch(self.device)

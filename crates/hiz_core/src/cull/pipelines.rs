@@ -41,6 +41,8 @@ pub(crate) enum Decision {
     Seen,
     /// Whether its shadow may be seen.
     Shadow,
+    /// Whether it may lie in the view, whatever hides it.
+    InView,
 }
 
 impl Decision {
@@ -57,11 +59,25 @@ impl Decision {
                 wgsl!("cull/shadow"),
                 wgsl!("cull/shadow_classify"),
             ],
+            Self::InView => {
+                &[wgsl!("cull/supporting_planes"), wgsl!("cull/unoccluded"), wgsl!("cull/in_view")]
+            }
         }
     }
 }
 
 impl CullKey {
+    /// The key of the tests of instances, for what they report.
+    ///
+    /// What surely shows is kept, and so is what may show.
+    /// Where nothing tells them apart, the nearest depths need not be read.
+    /// A descent reads them all the same: it ends where an instance surely shows.
+    pub(super) fn of_instances(self, report: &ReportKey) -> Self {
+        let descends = self.descent || self.fit_volume || self.decision == Decision::Shadow;
+        let is_told = report.verdicts || report.statistics;
+        Self { nearest: self.nearest && (is_told || descends), ..self }
+    }
+
     /// The key of a pass that reads no depth.
     pub(crate) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
         Self {
@@ -152,6 +168,14 @@ impl FramePass {
             Self::Alone => SURVIVOR_BINDINGS,
             Self::Early(_) => EARLY_SURVIVOR_BINDINGS,
             Self::Late => LATE_SURVIVOR_BINDINGS,
+        }
+    }
+
+    /// What an early pass decides about a candidate: sizes need its rectangle.
+    pub(crate) fn decision(self) -> Decision {
+        match self {
+            Self::Early(Candidates::History | Candidates::Given) => Decision::InView,
+            Self::Early(Candidates::Size) | Self::Alone | Self::Late => Decision::Seen,
         }
     }
 
@@ -482,8 +506,12 @@ pub(crate) fn cull_boxes_module(
     (pass, is_top): (FramePass, bool),
 ) -> Source {
     let shared = [wgsl!("instances/tier"), wgsl!("instances/groups"), wgsl!("output/statistics")];
-    let which = if is_top { wgsl!("cull/cull_groups") } else { wgsl!("cull/cull_children") };
-    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_box"), which]].concat();
+    let which: &[File] = if is_top {
+        &[wgsl!("cull/cull_groups")]
+    } else {
+        &[wgsl!("cull/parents"), wgsl!("cull/cull_children")]
+    };
+    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_box")], which].concat();
     unexplained(store, BoundsKind::Box, decision, &entry)
 }
 
@@ -519,7 +547,7 @@ fn members_module(
         wgsl!("output/report"),
         wgsl!("instances/groups"),
     ];
-    let last = [wgsl!("cull/survivors"), entry];
+    let last = [wgsl!("cull/parents"), entry];
     let files = [&shared[..], &emit.files(), pass.member_files(), &last].concat();
     unexplained(store, kind, decision, &files)
 }

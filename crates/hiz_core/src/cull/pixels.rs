@@ -39,7 +39,10 @@ pub(crate) struct CountingUniform {
 /// The shader that counts pixels.
 pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
     let row = match store {
-        DepthStore::Apart(SourceKind::Bits | SourceKind::Pair) => {
+        DepthStore::Apart(SourceKind::Pair) => {
+            [wgsl!("cull/pixels_row_pair"), wgsl!("cull/pixels_row_apart")].to_vec()
+        }
+        DepthStore::Apart(SourceKind::Bits) => {
             [wgsl!("cull/pixels_row_bits"), wgsl!("cull/pixels_row_apart")].to_vec()
         }
         DepthStore::Apart(_) => {
@@ -47,9 +50,12 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
         }
         DepthStore::Atlas => vec![wgsl!("cull/pixels_row_atlas")],
     };
-    let entry =
-        [&row[..], &[wgsl!("instances/piece"), wgsl!("cull/pixels_planes"), wgsl!("cull/pixels")]];
-    unexplained(store, kind, Decision::Seen, &entry.concat())
+    let alone: &[_] = match store {
+        DepthStore::Apart(SourceKind::Pair) => &[],
+        _ => &[wgsl!("cull/pixels_row_alone")],
+    };
+    let count = [wgsl!("instances/piece"), wgsl!("cull/pixels_planes"), wgsl!("cull/pixels")];
+    unexplained(store, kind, Decision::Seen, &[&row[..], alone, &count].concat())
 }
 
 fn pixels_pipeline(

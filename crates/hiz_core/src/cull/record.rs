@@ -368,7 +368,7 @@ impl<'a> Tests<'a> {
         let flat = if groups.iter().all(Option::is_some) {
             None
         } else {
-            Some(flat(gpu, &key, &target.report)?)
+            Some(flat(gpu, &key.of_instances(&target.report), &target.report)?)
         };
         Ok(Self { target, groups, flat })
     }

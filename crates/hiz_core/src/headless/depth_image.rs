@@ -46,6 +46,8 @@ pub struct DepthImage {
     pub(super) near_slack: NearSlack,
     /// What it tells of pixels that are far.
     pub(super) far_pixels: FarPixels,
+    /// Whether its conversion has made pixels far that may have no depth, and does not tell which.
+    pub(super) no_data_is_far: bool,
     /// How many samples of each pixel the depth is the farthest of.
     pub(super) samples: u32,
     /// The nearest of several samples.
@@ -148,6 +150,7 @@ impl DepthImage {
             tolerance: DepthTolerance::NONE,
             near_slack: NearSlack::NONE,
             far_pixels: FarPixels::BackgroundApart,
+            no_data_is_far: false,
             samples: 1,
             nearest: None,
             drawn: None,
@@ -168,6 +171,7 @@ impl DepthImage {
             tolerance: DepthTolerance::NONE,
             near_slack: NearSlack::NONE,
             far_pixels: FarPixels::BackgroundApart,
+            no_data_is_far: false,
             samples: 1,
             nearest: None,
             drawn: None,
@@ -250,7 +254,8 @@ impl DepthImage {
         let is_unchanged = conversion.unchanged().is_some();
         let far_pixels = if is_unchanged { FarPixels::BackgroundApart } else { far_pixels(depths) };
         let (tolerance, near_slack) = (conversion.left(), conversion.near_slack());
-        Ok(Self { tolerance, near_slack, far_pixels, ..self })
+        let no_data_is_far = conversion.has_lost_no_data();
+        Ok(Self { tolerance, near_slack, far_pixels, no_data_is_far, ..self })
     }
 
     /// Writes the rows that `fill` makes, which gets the first row of a band and room for it.
@@ -297,6 +302,7 @@ impl DepthImage {
             tolerance: DepthTolerance::NONE,
             near_slack: NearSlack::NONE,
             far_pixels: FarPixels::BackgroundApart,
+            no_data_is_far: false,
             samples: 1,
             nearest: None,
             drawn: None,
@@ -391,6 +397,7 @@ impl Engine {
                 tolerance: DepthTolerance::NONE,
                 near_slack: NearSlack::NONE,
                 far_pixels: FarPixels::BackgroundApart,
+                no_data_is_far: false,
                 samples: 1,
                 nearest: None,
                 drawn: Some(drawn),

@@ -96,3 +96,4 @@ pub use single::SingleCull;
 pub use slots::CULLS_IN_FLIGHT;
 pub use two_passes::{EarlyMask, PassAnswer, TwoPasses};
 pub use views::{AmongSource, ViewsCulling};
+pub use warm_up::MoreWarmUp;

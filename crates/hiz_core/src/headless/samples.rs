@@ -61,6 +61,7 @@ impl Engine {
             tolerance: samples.tolerance(),
             near_slack: samples.near_slack(),
             far_pixels: far_pixels(depths),
+            no_data_is_far: samples.have_lost_no_data(),
             nearest,
             ..image
         })
@@ -101,6 +102,11 @@ impl<'a> Samples<'a> {
             relative: a.relative.max(b.relative),
             absolute: a.absolute.max(b.absolute),
         })
+    }
+
+    /// Whether a sample's conversion has lost which pixels have no depth.
+    pub(super) fn have_lost_no_data(&self) -> bool {
+        self.conversions.iter().any(Conversion::has_lost_no_data)
     }
 
     /// How near the surfaces may be: the most that any sample's may.

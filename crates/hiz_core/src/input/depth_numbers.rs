@@ -81,7 +81,7 @@ impl DepthNumbers<'_> {
     }
 }
 
-/// The float16 of these bits, exactly; NaN for infinity, which is no depth either.
+/// The float16 of these bits, exactly.
 ///
 /// Moved by 13 bits, its exponent and fraction are those of a float32 that is 2^-112 times as
 /// large, subnormals included.
@@ -89,7 +89,9 @@ impl DepthNumbers<'_> {
 pub(super) fn of_half(bits: u16) -> f32 {
     let (sign, rest) = (u32::from(bits & 0x8000), u32::from(bits & 0x7fff));
     let size = f32::from_bits(rest << 13) * f32::from_bits((127 + 112) << 23);
-    let size = if rest < 0x7c00 { size } else { f32::NAN };
+    // An exponent of ones: infinity, or NaN.
+    let special = if rest == 0x7c00 { f32::INFINITY } else { f32::NAN };
+    let size = if rest < 0x7c00 { size } else { special };
     f32::from_bits(size.to_bits() | sign << 16)
 }
 
@@ -104,6 +106,7 @@ mod tests {
             let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
             let size = match exponent {
                 0 => fraction / 1024.0 * 2.0_f64.powi(-14),
+                31 if fraction == 0.0 => f64::INFINITY,
                 31 => f64::NAN,
                 _ => (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15),
             };

@@ -118,13 +118,15 @@ pub(super) fn all() -> Vec<(String, Source)> {
         );
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
-    // The sets of an early pass differ in a constant.
-    let early = (DepthStore::Atlas, FramePass::Early(Candidates::History));
+    // The sets of an early pass differ in a constant, and in what is decided.
+    let early = [Candidates::History, Candidates::Size]
+        .map(|candidates| (DepthStore::Atlas, FramePass::Early(candidates)));
     let passes = [FramePass::Alone, FramePass::Late];
     let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
-    for (store, pass) in passes.chain([early]) {
+    for (store, pass) in passes.chain(early) {
+        let decision = pass.decision();
         for (name, is_top) in [("cull_groups", true), ("cull_children", false)] {
-            let module = cull_boxes_module(store, Decision::Seen, (pass, is_top));
+            let module = cull_boxes_module(store, decision, (pass, is_top));
             all.push((format!("{name} {store:?} {pass:?}"), module));
         }
         let emits: &[_] = if pass == FramePass::Alone { &EMITS } else { &EMITS_OF_TWO };
@@ -133,8 +135,8 @@ pub(super) fn all() -> Vec<(String, Source)> {
         {
             let named = |name: &str| format!("{name} {way} {store:?} {pass:?} {kind:?}");
             let of = (emit, pass);
-            all.push((named("cull"), flat_module(store, kind, Decision::Seen, of)));
-            let members = cull_members_module(store, kind, Decision::Seen, of);
+            all.push((named("cull"), flat_module(store, kind, decision, of)));
+            let members = cull_members_module(store, kind, decision, of);
             all.push((named("cull_members"), members));
             if matches!(pass, FramePass::Early(_)) {
                 continue;
@@ -182,6 +184,8 @@ fn snippets() -> Source {
 
 #[cfg(test)]
 pub(in crate::testing) mod tests {
+    use std::collections::HashSet;
+
     use super::*;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
@@ -197,6 +201,27 @@ pub(in crate::testing) mod tests {
             .validate(&module)
             .unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
         module
+    }
+
+    /// The first modules of the list that have every file between them.
+    ///
+    /// What a file declares is the same in all of its modules.
+    /// So declarations are looked at here, instead of in every module again.
+    pub(in crate::testing) fn covering() -> Vec<(Source, naga::Module)> {
+        let mut seen = HashSet::new();
+        let mut has_new = |source: &Source| {
+            source.files().iter().fold(false, |has_new, file| seen.insert(file.path) || has_new)
+        };
+        let sources = all().into_iter().map(|(_, source)| source);
+        sources.filter(&mut has_new).map(|s| (s.clone(), parse(&s.text()))).collect()
+    }
+
+    #[test]
+    fn every_file_is_in_a_module() {
+        let covered: HashSet<&str> =
+            covering().iter().flat_map(|(source, _)| source.files()).map(|f| f.path).collect();
+        let left_out: Vec<_> = files().into_iter().filter(|(p, _)| !covered.contains(p)).collect();
+        assert!(left_out.is_empty(), "{left_out:?}");
     }
 
     #[test]
@@ -251,7 +276,7 @@ pub(in crate::testing) mod tests {
                 1,
                 "the depth that slack has moved"
             );
-            assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
+            assert_eq!(calls(&module, "surely_outside", "bar"), 2, "-A and 1 - A");
             assert_eq!(calls(&module, "surely_in_front", "bar"), 1, "d - A");
             assert_eq!(
                 calls(&module, "revealing_depth", "bar"),

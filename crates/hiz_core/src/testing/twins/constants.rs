@@ -16,7 +16,6 @@ use crate::cull::refine;
 use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::clock_check;
 use crate::gpu::depth_source::SourceKind;
-use crate::gpu::shader::FILES;
 use crate::host::rounding::EPS;
 use crate::input::bounds::BoundsKind;
 use crate::input::image::MAX_IMAGE_SIDE;
@@ -44,8 +43,8 @@ use crate::pyramid::receiver_mask::{MASK_BLOCK_LOG2, MASK_SIDE};
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
 use crate::pyramid::resolve;
 use crate::testing::lod;
-use crate::testing::shaders::tests::parse;
-use crate::testing::shaders::{EMITS, EMITS_OF_TWO, KINDS, all, files};
+use crate::testing::shaders::tests::{covering, parse};
+use crate::testing::shaders::{EMITS, EMITS_OF_TWO, KINDS, files};
 use crate::yardstick::reduce as yardstick;
 
 /// From this magnitude on, the next float32 makes up for two flushed subnormals.
@@ -143,6 +142,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("cull/shadow_classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
+        ("cull/in_view", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
         ("output/join", "WORKGROUP", int(views::WORKGROUP)),
         ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
@@ -281,10 +281,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
 /// The constants of every file that are one number: by file and name.
 fn numbers() -> BTreeMap<(String, String), f64> {
     let mut numbers = BTreeMap::new();
-    for (_, source) in all() {
-        let text = source.text();
-        let module = parse(&text);
-        let here: Vec<_> = FILES.iter().filter(|file| text.contains(file.text)).collect();
+    for (source, module) in covering() {
         for (_, constant) in module.constants.iter() {
             let Some(name) = &constant.name else { continue };
             let value = match module.global_expressions[constant.init] {
@@ -294,7 +291,7 @@ fn numbers() -> BTreeMap<(String, String), f64> {
                 _ => continue,
             };
             let said = format!("const {name}:");
-            for file in here.iter().filter(|file| file.text.contains(&said)) {
+            for file in source.files().iter().filter(|file| file.text.contains(&said)) {
                 numbers.insert((file.path.to_owned(), name.clone()), value);
             }
         }
@@ -472,10 +469,10 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
 fn workgroups_have_the_sizes_that_dispatches_count_on() {
     let expected = workgroups();
     let mut found = BTreeSet::new();
-    for (name, source) in all() {
-        for point in parse(&source.text()).entry_points {
+    for (_, module) in covering() {
+        for point in module.entry_points {
             let size = expected.get(point.name.as_str());
-            assert_eq!(size, Some(&point.workgroup_size), "{name}: {}", point.name);
+            assert_eq!(size, Some(&point.workgroup_size), "{}", point.name);
             found.insert(point.name);
         }
     }
@@ -501,8 +498,10 @@ fn a_cull_sets_every_override() {
             decision: Decision::Seen,
         };
         let alone = EMITS.map(|emit| (emit, FramePass::Alone));
-        let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
+        let early = [Candidates::History, Candidates::Size].map(FramePass::Early);
+        let of_two = early
             .into_iter()
+            .chain([FramePass::Late])
             .flat_map(|pass| EMITS_OF_TWO.map(|emit| (emit, pass)));
         for ((way, emit), pass) in alone.into_iter().chain(of_two) {
             let report = ReportKey {
@@ -515,7 +514,7 @@ fn a_cull_sets_every_override() {
             };
             let set = classify_constants(&key).into_iter().chain(report_constants(&report));
             let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-            let module = parse(&flat_module(store, kind, Decision::Seen, (emit, pass)).text());
+            let module = parse(&flat_module(store, kind, pass.decision(), (emit, pass)).text());
             let declared: BTreeSet<String> =
                 module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
             assert_eq!(set, declared, "{kind:?} {way} {pass:?}");
