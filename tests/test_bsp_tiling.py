@@ -46,6 +46,16 @@ def test_hidden_boxes_are_left_out(device: hizvk.Device) -> None:
     assert repr(seen) == "<TiledCoverage 64x64: 2 visible triangles>"
 
 
+@pytest.mark.slow
+def test_triangles_that_split_without_end_are_refused(device: hizvk.Device) -> None:
+    """Large triangles that all cross: 5,000 of them made 13 million parts, of 3.6 GB."""
+    corners = np.random.default_rng(0).normal(size=(5000, 3, 3)) * 5.0
+    soup = device.occluders(corners.reshape(-1, 3), np.arange(15000).reshape(-1, 3))
+    with pytest.raises(hizvk.LimitError, match="parts of split triangles") as error:
+        hizvk.BspTiling(soup)
+    assert error.value.allowed == 2**20 + 16 * 5000
+
+
 def test_the_bench_compares_with_depth_tiles(tmp_path: Path) -> None:
     found = bench.run(tmp_path, keys=["village"], views=1, size=(60, 80))
     assert found.passed

@@ -220,6 +220,13 @@ def test_meshes_without_volume_have_nothing_inside(vertices: np.ndarray, triangl
     assert len(hizvk.inner_prisms(vertices, triangles, up=(0, 0, 1))) == 0
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("height", [5e-324, 1e-310, 1e-300])
+def test_a_sheet_thinner_than_float64_tells_warns_of_nothing(height: float) -> None:
+    found = hizvk.inner_boxes(*box_mesh([[0, 0, 0]], [[4, 4, height]]))
+    assert len(found) <= 1
+
+
 def test_open_meshes_are_refused_with_the_way_out() -> None:
     vertices, triangles = box_mesh([[0, 0, 0]], [[1, 1, 1]])
     for make in (hizvk.inner_boxes, lambda *m: hizvk.inner_prisms(*m, up=(0, 0, 1))):

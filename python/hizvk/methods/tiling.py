@@ -44,6 +44,8 @@ class BspTiling:
     ------
     TypeError, ValueError
         They name the parameter, what it expects and what came.
+    LimitError
+        If the triangles cut one another into more than 16 parts for each and 2^20 besides.
 
     Examples
     --------

@@ -29,6 +29,8 @@ SEEDS: Final = 2048
 CUBES: Final = (0.0, 0.5, 1.0)
 #: Smaller parts of the volume are roundings of its sums.
 SOME: Final = 1e-9
+#: Smaller volumes have lost bits, or are 0.
+SMALLEST: Final = float(np.finfo(np.float64).tiny)
 
 
 def grow(
@@ -63,7 +65,9 @@ def grow(
     chosen: list[int] = []
     while len(chosen) < max_boxes:
         new = _sums(_table(left), boxes)
-        worth = np.where(new >= least, surface * (new / volume), 0.0)
+        # A box whose volume leaves float64's range is nothing worth.
+        share = np.divide(new, volume, out=np.zeros_like(volume), where=volume >= SMALLEST)
+        worth = np.where(new >= least, surface * share, 0.0)
         best = int(np.argmax(worth))
         if worth[best] == 0.0:
             break

@@ -108,24 +108,29 @@ mod tests {
     /// No position within an off-centre image has a greater norm than its corners.
     #[test]
     fn corners_are_the_greatest() {
-        let projection = Projection::Frustum {
-            left: -0.3,
-            right: 2.0,
-            bottom: -1.5,
-            top: 0.1,
-            near: 0.2,
-            far: Some(50.0),
-            convention: DepthConvention::Standard,
-        };
-        let camera = camera(&projection, (300, 200));
-        let whole = Stretch::of(&camera).pixels;
+        // The borders of the image at depth 1; each of its four corners is farthest out once.
+        for (left, right, bottom, top) in [
+            (-0.3, 2.0, -1.5, 0.1),
+            (-2.0, 0.3, -1.5, 0.1),
+            (-0.3, 2.0, -0.1, 1.5),
+            (-2.0, 0.3, -0.1, 1.5),
+        ] {
+            let (near, far, convention) = (0.2, Some(50.0), DepthConvention::Standard);
+            let projection =
+                Projection::Frustum { left, right, bottom, top, near, far, convention };
+            corners_are_greatest(&camera(&projection, (30, 20)));
+        }
+    }
+
+    fn corners_are_greatest(camera: &Camera) {
+        let whole = Stretch::of(camera).pixels;
         let rows = camera.rows_near_one();
         let row = |r: usize, s: f64| [0, 1, 2].map(|k| s * rows[r][k]);
-        let (x, y, w) = (row(0, 150.0), row(1, -100.0), row(3, 1.0));
+        let (x, y, w) = (row(0, 15.0), row(1, -10.0), row(3, 1.0));
         let mut greatest = 0.0_f64;
-        for i in 0..=300 {
-            for j in 0..=200 {
-                let (t_x, t_y) = (f64::from(i) - 150.0, f64::from(j) - 100.0);
+        for i in 0..=30 {
+            for j in 0..=20 {
+                let (t_x, t_y) = (f64::from(i) - 15.0, f64::from(j) - 10.0);
                 let at = |row: Vec3, t: f64| [0, 1, 2].map(|k| row[k] - t * w[k]);
                 let (first, second) = (at(x, t_x), at(y, t_y));
                 for turn in 0..64 {

@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::host::linear::{Vec3, cross, dot, normalized, sub};
 use crate::methods::tiling::fault::{Planted, is_planted};
 use crate::occluders::placement::Placement;
@@ -35,6 +35,9 @@ impl Default for BspOptions {
 
 /// The leaves of the octree that takes the place of one tree.
 const LEAF: u32 = 64;
+/// A tree is given up beyond these, because large triangles that cross may split without end.
+const MOST_PARTS: usize = 1 << 20;
+const MOST_PARTS_PER_TRIANGLE: usize = 16;
 /// Cells are divided at most so often.
 const DEEPEST: u32 = 16;
 /// Candidates for a plane, and triangles that each is tried on.
@@ -172,9 +175,10 @@ impl BspTree {
     /// The tree of these triangles where they stand now.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::Limit`] where triangles cut one another into too many parts: more than 16 for each
+    /// and 2^20 besides.
     pub fn new(surface: &OccluderSurface, options: &BspOptions) -> Result<Self> {
-        Ok(Self::planted(surface, options, Planted::default()))
+        Self::planted(surface, options, Planted::default())
     }
 
     /// [`BspTree::new`] with a planted fault, for tests.
@@ -187,10 +191,10 @@ impl BspTree {
         options: &BspOptions,
         fault: Option<super::fault::TilingFault>,
     ) -> Result<Self> {
-        Ok(Self::planted(surface, options, Planted(fault)))
+        Self::planted(surface, options, Planted(fault))
     }
 
-    fn planted(surface: &OccluderSurface, options: &BspOptions, fault: Planted) -> Self {
+    fn planted(surface: &OccluderSurface, options: &BspOptions, fault: Planted) -> Result<Self> {
         let placements = surface.placements().to_vec();
         let shapes = surface.shapes();
         let mut sources = Vec::new();
@@ -212,15 +216,23 @@ impl BspTree {
             fault,
             is_octree: false,
         };
+        let triangles = tree.sources.len();
+        let allowed = MOST_PARTS + MOST_PARTS_PER_TRIANGLE * triangles;
         let most = match options.leaf {
-            Some(_) => f64::INFINITY,
-            None => options.most_parts * tree.sources.len() as f64,
+            Some(_) => allowed as f64,
+            None => (options.most_parts * triangles as f64).min(allowed as f64),
         };
-        if !tree.grow(options.leaf, most) {
-            tree.grow(Some(LEAF), f64::INFINITY);
+        let mut is_done = tree.grow(options.leaf, most);
+        if !is_done && options.leaf.is_none() {
+            is_done = tree.grow(Some(LEAF), allowed as f64);
+        }
+        if !is_done {
+            // It was given up at the first part too many.
+            let allowed = allowed as u64;
+            return Err(Error::limit("parts of split triangles", allowed + 1, allowed));
         }
         tree.measure();
-        tree
+        Ok(tree)
     }
 
     /// Makes all nodes; false if there are more than `most` parts.
