@@ -5,15 +5,7 @@
 // It is the first step of the whole test.
 // The others look for a rectangle and for depth, which these candidates do not need.
 // Software drivers skip no branch, so the whole test would take twice the time.
-
-// These are here for the pipeline's key: no pixel and no depth is looked at.
-override SAMPLE_COVERAGE: bool;
-override DESCENT: bool;
-override FIT_VOLUME: bool;
-
-// An instance that is absent has its centre below this, on the first axis.
-// The same as in `classify.wgsl`.
-const ABSENT_BELOW: f32 = -0x1p61;
+// No pixel and no depth is looked at, so the options of `decision.wgsl` change nothing here.
 
 fn classify(i: u32) -> Outcome {
     var out = Outcome(INVALID, AT_VALIDITY, vec4<i32>(0), 0u, vec4<u32>(0u), 0u, 0u, 0u);

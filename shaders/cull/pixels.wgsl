@@ -16,7 +16,8 @@
 // - `classify.wgsl`: `pixel_interval`, `between_samples`, `inside_block`
 
 // True: a pixel of level 0 stands for all that its surface shows.
-// False: it is the farthest of several samples, and only the nearest says what is behind the volume.
+// False: it is the farthest of several samples.
+// Then only the nearest one says what is behind the volume.
 override ONE_SAMPLE: bool;
 // True: set the bit of each instance that may show in more than a negligible number of pixels.
 override SHOWN: bool;

@@ -11,6 +11,7 @@ use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{File, Source, wgsl};
 use crate::input::bounds::BoundsKind;
 use crate::instances::piece::RECORD_BINDINGS;
+use crate::output::bins::PlaneSet;
 
 /// Everything in which one cull pipeline differs from another.
 /// Each is compiled without the branches that it does not take.
@@ -196,7 +197,7 @@ pub(crate) enum EmitKey {
     /// One list, or none.
     List { append: bool, list: bool, capped: bool },
     /// Bit planes, of which bins are made later.
-    Planes { by_index: bool, bins: BinKey },
+    Planes { by_index: bool, set: PlaneSet, bins: BinKey },
     /// The bins of one mesh, in any order.
     Append { list: bool, capped: bool, record_words: u32, bins: BinKey },
 }
@@ -249,9 +250,10 @@ impl EmitKey {
             Self::List { append, list, capped } => {
                 vec![("APPEND", flag(append)), ("LIST", flag(list)), ("CAPPED", flag(capped))]
             }
-            Self::Planes { by_index, bins } => {
-                bins.constants().chain([("BY_INDEX", flag(by_index))]).collect()
-            }
+            Self::Planes { by_index, set, bins } => bins
+                .constants()
+                .chain([("BY_INDEX", flag(by_index)), ("PLANES", f64::from(set.planes()))])
+                .collect(),
             Self::Append { list, capped, record_words, bins } => bins
                 .constants()
                 .chain([
@@ -456,6 +458,7 @@ pub(crate) fn decision_module(
             wgsl!("cull/certificate"),
             wgsl!("output/verdict"),
             wgsl!("cull/outcome"),
+            wgsl!("cull/decision"),
             wgsl!("pyramid/levels"),
         ],
         &store.files(),

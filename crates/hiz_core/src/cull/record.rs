@@ -440,6 +440,7 @@ fn report_key(
         match (any_order, bins.can_append()) {
             (false, _) => EmitKey::Planes {
                 by_index: bins.arrangement == Arrangement::Instances,
+                set: bins.plane_set(),
                 bins: of_bins,
             },
             (true, true) => EmitKey::Append {
@@ -492,6 +493,7 @@ pub(super) fn pass_report(
     let emit = match &visible.bins {
         Some(bins) => EmitKey::Planes {
             by_index: bins.arrangement == Arrangement::Instances,
+            set: bins.plane_set(),
             bins: bin_key(instances, bins, options),
         },
         None => EmitKey::Mask,

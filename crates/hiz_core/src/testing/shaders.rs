@@ -20,8 +20,9 @@ use crate::instances::update::update_module;
 #[cfg(feature = "methods")]
 use crate::methods::{coarse_level_module, fragment_levels_module, texts_module};
 use crate::occluders::device_raster::occluders_module;
+use crate::output::bins::PlaneSet;
 use crate::output::compact::{compact_module, copy_module};
-use crate::output::cut::{cut_module, emit_cut_module};
+use crate::output::cut::cut_module;
 use crate::output::emit_passes;
 use crate::output::views::join_module;
 use crate::pyramid::mips_passes::mips_module;
@@ -44,8 +45,8 @@ pub(super) const KINDS: [BoundsKind; 5] = [
 /// Every way to emit the kept instances, each with a shader of its own.
 pub(super) const EMITS: [(&str, EmitKey); 5] = [
     ("list", EmitKey::NO_LIST),
-    ("planes", EmitKey::Planes { by_index: false, bins: ONE_LOD }),
-    ("planes of LODs", EmitKey::Planes { by_index: false, bins: LODS }),
+    ("planes", EmitKey::Planes { by_index: false, set: PlaneSet::One, bins: ONE_LOD }),
+    ("planes of LODs", EmitKey::Planes { by_index: false, set: PlaneSet::Four, bins: LODS }),
     ("bins", EmitKey::Append { list: true, capped: true, record_words: 5, bins: ONE_LOD }),
     ("bins of LODs", EmitKey::Append { list: true, capped: true, record_words: 5, bins: LODS }),
 ];
@@ -72,12 +73,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("compact".to_owned(), compact_module()),
         ("copy".to_owned(), copy_module()),
         ("cut".to_owned(), cut_module()),
-        ("emit_cut".to_owned(), emit_cut_module()),
-        ("emit_scan".to_owned(), emit_passes::scan_module()),
-        ("emit_bins".to_owned(), emit_passes::bins_module()),
-        ("emit_draws".to_owned(), emit_passes::draws_module()),
-        ("emit_scatter".to_owned(), emit_passes::scatter_module()),
-        ("emit_instances".to_owned(), emit_passes::instances_module()),
+        ("emit_draws".to_owned(), emit_passes::draws_module(PlaneSet::One)),
         ("count".to_owned(), count_module()),
         ("among_order".to_owned(), among_order_module()),
         ("join_views".to_owned(), join_module()),
@@ -89,6 +85,16 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
         ("snippets".to_owned(), snippets()),
     ];
+    for set in [PlaneSet::One, PlaneSet::Four] {
+        let modules: [(_, fn(_) -> _); 5] = [
+            ("emit_cut", emit_passes::cut_module),
+            ("emit_scan", emit_passes::scan_module),
+            ("emit_bins", emit_passes::bins_module),
+            ("emit_scatter", emit_passes::scatter_module),
+            ("emit_instances", emit_passes::instances_module),
+        ];
+        all.extend(modules.map(|(name, module)| (format!("{name} {set:?}"), module(set))));
+    }
     #[cfg(feature = "methods")]
     all.extend([
         ("published tests".to_owned(), texts_module()),
@@ -209,8 +215,9 @@ pub(in crate::testing) mod tests {
     /// So declarations are looked at here, instead of in every module again.
     pub(in crate::testing) fn covering() -> Vec<(Source, naga::Module)> {
         let mut seen = HashSet::new();
+        // All files of a module are taken in, so it is no `any`, which would stop at the first one.
         let mut has_new = |source: &Source| {
-            source.files().iter().fold(false, |has_new, file| seen.insert(file.path) || has_new)
+            source.files().iter().filter(|file| seen.insert(file.path)).count() > 0
         };
         let sources = all().into_iter().map(|(_, source)| source);
         sources.filter(&mut has_new).map(|s| (s.clone(), parse(&s.text()))).collect()

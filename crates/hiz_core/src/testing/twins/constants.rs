@@ -27,7 +27,7 @@ use crate::instances::update;
 use crate::instances::volume_record::{ABSENT_CENTER, BEYOND_LIMITS, LARGEST};
 use crate::instances::{from_buffer, tiers};
 use crate::methods;
-use crate::output::bins::BLOCK_WORDS;
+use crate::output::bins::{BLOCK_WORDS, PlaneSet};
 use crate::output::compact::SCATTER_WORKGROUP;
 use crate::output::cut::CUT_WORKGROUP;
 use crate::output::emit_passes;
@@ -140,17 +140,17 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/record_layout", "ABSENT_CENTER_BITS", bits(ABSENT_CENTER)),
         ("instances/record_layout", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
-        ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
-        ("cull/shadow_classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
-        ("cull/in_view", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
+        ("cull/decision", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
         ("output/join", "WORKGROUP", int(views::WORKGROUP)),
-        ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
-        ("output/emit_bins", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_planes", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
+        ("output/emit_prefix", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_prefix", "MESHES", int(emit_passes::MESHES)),
         ("output/emit_instances", "WORKGROUP", int(emit_passes::WORKGROUP)),
-        ("output/emit_scan", "LANES", int(emit_passes::WORKGROUP)),
         ("output/emit_scan", "SHARE", int(BLOCK_WORDS / emit_passes::WORKGROUP)),
         ("output/emit_scatter", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/planes_one", "PLANES", int(PlaneSet::One.planes())),
+        ("output/planes_four", "PLANES", int(PlaneSet::Four.planes())),
         ("output/mesh_table", "MESH_TEXELS", MESH_TEXELS as f64),
         ("output/cut", "WORKGROUP", int(CUT_WORKGROUP)),
         ("output/emit_cut", "WORKGROUP", int(CUT_WORKGROUP)),
@@ -187,7 +187,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
 /// What is known of those that carry a proof is in `constants_cover_what_is_counted`.
 const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
-    ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
+    ("cull/decision", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
@@ -209,7 +209,6 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/pixels_planes", &["FACE_PLANES", "DEPTH_PLANES", "OUTLINE_PLACES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
     ("cull/shadow", &["NO_FACE"]),
-    ("cull/shadow_classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     (
         "pyramid/receiver_mask",
@@ -272,9 +271,9 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("instances/bounds_point_support", &["CANDIDATES", "OUTLINES"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
-    ("output/emit_draws", &["LANES"]),
     ("output/emit_record", &["COMMON_WORDS"]),
-    ("output/emit_scatter", &["FOUR", "NUMBERS"]),
+    ("output/emit_scatter", &["MANY", "LINE", "NO_INDEX_BIT"]),
+    ("output/planes_four", &["COUNT_BITS", "COUNT_MASK"]),
     ("output/mesh_table", &["ERRORS_LOG2"]),
 ];
 
@@ -354,6 +353,8 @@ fn constants_fit_each_other() {
     assert_eq!(MAX_IMAGE_SIDE, 1 << (MAX_LEVELS - 1));
     assert_eq!(Stage::ALL.map(|s| s as usize), std::array::from_fn(|i| i));
     assert!(BLOCK_WORDS.is_power_of_two());
+    // Counts within a block are packed to 16 bits.
+    assert!(32 * BLOCK_WORDS <= 1 << 16);
     // A texel for the number of a mesh's LODs, and one for each four errors.
     assert_eq!(MESH_TEXELS - 1, MAX_LODS >> number("output/mesh_table", "ERRORS_LOG2") as u32);
     // The spacing just below 2^-100 exceeds two flushed numbers.
@@ -385,7 +386,7 @@ fn constants_cover_what_is_counted() {
     assert!(number("instances/bounds_sphere", "SQUARES_FLOOR") >= two_to(-100));
     assert!(number("instances/bounds_sphere", "AXES") >= 3.0);
     // The margin is at least 2^-70; a ratio may not overflow.
-    assert!(number("cull/classify", "LEAST_W") >= two_to(-66));
+    assert!(number("cull/decision", "LEAST_W") >= two_to(-66));
     let planes = |name: &str| number("cull/supporting_planes", name);
     // Six roundings of a texel's comparison, and what is flushed there.
     assert!(planes("TEXEL_ULPS") >= 6.0);
@@ -415,9 +416,8 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("cut", line(CUT_WORKGROUP)),
         ("emit_bins", line(emit_passes::WORKGROUP)),
         ("emit_block", line(emit_passes::WORKGROUP)),
-        // One workgroup, the largest that WebGPU promises.
         ("emit_cut", line(CUT_WORKGROUP)),
-        ("emit_draws", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
+        ("emit_draws", line(emit_passes::WORKGROUP)),
         ("emit_instances", line(emit_passes::WORKGROUP)),
         ("emit_scatter", line(emit_passes::WORKGROUP)),
         ("emit_top", line(emit_passes::WORKGROUP)),

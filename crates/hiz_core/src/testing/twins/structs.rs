@@ -63,7 +63,6 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Tiling",
     "Value",
     "Volume",
-    "Word",
 ];
 
 /// Offsets of a WGSL struct's members, and its size.
@@ -99,7 +98,7 @@ macro_rules! twin {
 fn struct_twins() -> Vec<(&'static str, Layout)> {
     vec![
         twin!("BinRange", BinRecord {
-            "begin" = begin, "count" = count, "shift" = shift, "padding" = padding,
+            "begin" = begin, "count" = count, "shift" = shift, "filled" = filled,
         }),
         twin!("Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
