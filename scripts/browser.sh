@@ -15,7 +15,9 @@ runs_as_browser() {
 # A container has no snaps, and installing it would fail or wait for them.
 is_snap_package() { apt-cache show "$1" 2>/dev/null | grep -qiw snap; }
 
-browser_note() { printf 'note: the test of the HTML page is skipped without Chromium: %s\n' "$1" >&2; }
+browser_note() {
+  printf 'note: the test of the HTML page is skipped without Chromium: %s\n' "$1" >&2
+}
 
 # About 120 MB are downloaded.
 browser_package() {
@@ -28,7 +30,8 @@ browser_package() {
   touch "$STAMPS/browser"
   if have apt-cache && is_snap_package chromium; then
     browser_note "here its package is a snap; install Google's own package, google-chrome"
-  elif ! have apt-get || ! can_be_root || ! (apt_install chromium) || ! runs_as_browser chromium; then
+  elif ! have apt-get || ! can_be_root || ! (apt_install chromium) ||
+    ! runs_as_browser chromium; then
     browser_note \
       "sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends chromium'"
   fi

@@ -13,7 +13,14 @@ import pytest
 import hizvk
 from hizvk.measuring.configuration import Configuration, DepthVariant
 from hizvk.measuring.spread import spread
-from hizvk.recommendation import Candidate, Recommendation, budget, checking, timing
+from hizvk.recommendation import (
+    Candidate,
+    Recommendation,
+    arguments,
+    budget,
+    checking,
+    timing,
+)
 from hizvk.recommendation.budget import admitted, by_use
 from hizvk.recommendation.tried import promised
 
@@ -24,7 +31,7 @@ CONSERVATIVE = DepthVariant(1, True)
 
 
 class Clock:
-    """Seconds that pass only where work is done."""
+    """Seconds that pass only where work is done; an image takes them by its pixels."""
 
     def __init__(self, *, image_s: float, compile_s: float, cull_s: float, views: int) -> None:
         self.now = 100.0
@@ -36,8 +43,9 @@ class Clock:
         return self.now
 
     def pyramids(self, variants: Iterable[DepthVariant], _: int) -> dict[DepthVariant, Any]:
-        self.now += self._image_s
-        return dict.fromkeys(variants, (None, 1000.0 * self._image_s))
+        made = {one: self._image_s / one.divisor**2 for one in variants}
+        self.now += sum(made.values())
+        return {one: (None, 1000.0 * took) for one, took in made.items()}
 
     def once(self, _: Any, __: Any, ___: Any, one: Configuration, *____: Any) -> None:
         self.now += self._cull_s + (0.0 if one in self._compiled else self._compile_s)
@@ -74,6 +82,20 @@ def test_rows_are_tried_while_all_of_them_can_be_measured_in_time(
         assert clock.now - begin == pytest.approx(image_s + count * 1.5)
 
 
+def test_a_larger_image_is_expected_to_take_longer() -> None:
+    """A quarter of each side takes 1 s, and the whole image 16 s, which would be too late."""
+    quarter, whole = (Configuration(depth=DepthVariant(n, True)) for n in (4, 1))
+    for seconds, expected in ((30.0, [quarter]), (40.0, [quarter, whole])):
+        clock = Clock(image_s=16.0, compile_s=1.0, cull_s=0.25, views=2)
+        # By hand: 1 + 1.5 + 1 + 1 for the quarter, and 16 + 1.5 + 16 + 1 for the whole, are 39.
+        begin = clock.now
+        assert tried(clock, [quarter, whole], seconds) == expected
+        assert clock.now - begin < seconds
+    plain = Configuration()
+    clock = Clock(image_s=0.125, compile_s=1.0, cull_s=0.25, views=1)
+    assert tried(clock, [quarter, plain], 9.0) == [quarter, plain]
+
+
 def test_the_first_row_always_runs_and_no_limit_tries_nothing() -> None:
     clock = Clock(image_s=1.0, compile_s=1.0, cull_s=1.0, views=3)
     assert tried(clock, rows(5), -1.0) == rows(1)
@@ -86,7 +108,7 @@ def test_the_surest_row_is_first_and_every_sort_has_its_turn() -> None:
     every = promised(("boxes", "spheres"), "area", rendered=True)
     order = by_use(every, every_ray=True, area=True)
     assert sorted(order, key=str) == sorted(every, key=str)
-    assert order[0].depth.conservative
+    assert order[0].depth == DepthVariant(4, True)  # of those that are proven, the cheapest
     assert order[0].coverage == "area"
     sorts = {(one.volume, one.depth, one.coverage, one.fit) for one in every}
     turn = order[: len(sorts)]
@@ -98,9 +120,12 @@ def test_the_surest_row_is_first_and_every_sort_has_its_turn() -> None:
     assert by_use(points, every_ray=False, area=True)[0].guard_px == 0.5
 
 
-@pytest.mark.parametrize(("seconds", "parts"), [(math.inf, 1), (8.0, 8), (3.0, 3), (0.0, 1)])
+@pytest.mark.parametrize(
+    ("seconds", "least", "parts"),
+    [(math.inf, 0, 1), (8.5, 0, 8), (3.5, 1, 3), (0.0, 0, 0), (0.0, 1, 1), (-9.0, 0, 0)],
+)
 def test_instances_are_looked_at_in_parts(
-    monkeypatch: pytest.MonkeyPatch, seconds: float, parts: int
+    monkeypatch: pytest.MonkeyPatch, seconds: float, least: int, parts: int
 ) -> None:
     """A second for each part; two views are left, so this one has half of the time."""
     clock = Clock(image_s=0.0, compile_s=0.0, cull_s=0.0, views=1)
@@ -116,10 +141,9 @@ def test_instances_are_looked_at_in_parts(
     monkeypatch.setattr(checking, "time", clock)
     judge: Any = SimpleNamespace(visible=visible)
     bounds: Any = None
-    looked, shown = checking._looked(judge, bounds, asked, 5, clock.now + 2.0 * seconds, 2)
+    looked, shown = checking._looked(judge, bounds, asked, 5, clock.now + 2.0 * seconds, 2, least)
     assert len(calls) == parts
-    expected = asked if seconds in (math.inf, 8.0) else np.concatenate(calls)
-    assert sorted(looked.tolist()) == sorted(expected.tolist())
+    assert looked.tolist() == [number for call in calls for number in call.tolist()]
     assert (shown == (looked % 3 == 0)).all()
     assert len(looked) == len(set(looked.tolist())) == 80 * parts // 8 or seconds == math.inf
 
@@ -137,7 +161,7 @@ def test_a_slow_device_ends_in_time(monkeypatch: pytest.MonkeyPatch, device: hiz
         [[-9.0, -9, -4], [0, -9, -4], [0, 9, -4], [-9, 9, -4]], [[0, 1, 2], [0, 2, 3]]
     )
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(32, 32), near=0.5)
-    balls = hizvk.Spheres([(-2.0, 0, -8), (2.0, 0, -8)], 0.5)
+    balls = hizvk.Spheres([(-5.0, 0, -8), (5.0, 0, -8)], 0.5)
     began = time.monotonic()
     found = hizvk.recommend(balls, camera, occluders=wall, device=device, max_seconds=2.0)
     assert time.monotonic() - began < 15.0  # mostly 2; others may use the machine
@@ -146,6 +170,30 @@ def test_a_slow_device_ends_in_time(monkeypatch: pytest.MonkeyPatch, device: hiz
     assert found.best.safe
     (note,) = (note for note in found.notes if note.startswith("There was no time for "))
     assert "first candidates, " in note
+
+
+@pytest.mark.parametrize(("seconds", "budgets"), [(10.0, 2), (5.0, 1), (-1.0, 1)])
+def test_occluders_are_selected_while_there_is_time(
+    monkeypatch: pytest.MonkeyPatch, seconds: float, budgets: int
+) -> None:
+    """Each budget takes 3 seconds, and a single mesh none: there is nothing to select."""
+    clock = Clock(image_s=0.0, compile_s=0.0, cull_s=0.0, views=1)
+    asked = []
+
+    def select(meshes: Any, *, max_triangles: int) -> Any:
+        clock.now += 3.0
+        asked.append(max_triangles)
+        return hizvk.select_occluders(meshes, max_triangles=max_triangles)
+
+    monkeypatch.setattr(arguments, "time", clock)
+    monkeypatch.setattr(arguments, "select_occluders", select)
+    corners = np.array([(0.0, 0, 0), (9, 0, 0), (0, 9, 0)])
+    meshes = [hizvk.Mesh(corners, [(0, 1, 2)]), hizvk.Mesh(corners / 900.0, [(0, 1, 2)])]
+    found = arguments.selections_of(meshes, 4, clock.now + seconds)
+    assert asked == [4, 1][:budgets]
+    assert list(found) == asked
+    assert arguments.selections_of(meshes[:1], 4, math.inf) == {}
+    assert len(asked) == budgets
 
 
 def made(kept: int, ms: float, **more: Any) -> Candidate:

@@ -59,6 +59,7 @@ TARGETS = {
     "cull.hidden95.differing": (0.001, False),
     "cull.hidden0.groups_over_flat": (1.1, False),
     "tiers.hidden0.1 tier, both ends": (0.5, False),
+    "tiers.above.1 tier, both ends": (0.5, False),
     "tiers.hidden95.fewer.farthest end": (100.0, True),
     "cull.many.flat": (2.0, False),
     "cull.many.groups": (2.0, False),

@@ -530,14 +530,14 @@ fn faults_of_both_ends_are_seen() {
             all,
         ),
         (
-            "bits == far_bits() || (REVERSED",
-            "bits == far_bits() && (REVERSED",
+            "(bits == far_bits()) | (REVERSED",
+            "(bits == far_bits()) & (REVERSED",
             Depths::Receivers,
             all,
         ),
         (
-            "return bits == far_bits() ||",
-            "return sanitized(bits) == far_bits() ||",
+            "return (bits == far_bits()) |",
+            "return (sanitized(bits) == far_bits()) |",
             Depths::Receivers,
             all,
         ),

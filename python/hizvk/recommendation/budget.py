@@ -30,7 +30,8 @@ LEAST_ROUNDS = 2
 def by_use(rows: Sequence[Configuration], *, every_ray: bool, area: bool) -> list[Configuration]:
     """The rows in the order in which they are tried, should there be no time for all.
 
-    The first is one that may surely be recommended, and each sort has its turn.
+    The first is one that may surely be recommended, the cheapest of these, and each sort has its
+    turn.
     What is there for comparison alone comes last.
 
     Parameters
@@ -47,10 +48,12 @@ def by_use(rows: Sequence[Configuration], *, every_ray: bool, area: bool) -> lis
         key = (one.volume, one.depth, one.coverage, one.fit, one.guard_px)
         sorts.setdefault(key, []).append(one)
 
-    def rank(sort: list[Configuration]) -> tuple[bool, bool]:
+    def rank(sort: list[Configuration]) -> tuple[bool, bool, bool, int]:
         one = sort[0]
+        is_compared = area and one.coverage == "sample"
         is_sure = one.promises_rays if every_ray else bool(one.guard_px)
-        return area and one.coverage == "sample", not is_sure
+        # Other images differ more than another fit does.
+        return is_compared, one.fit != "rectangle", not is_sure, -one.depth.divisor
 
     turns = zip_longest(*sorted(sorts.values(), key=rank))
     return [one for turn in turns for one in turn if one is not None]
@@ -73,25 +76,23 @@ def admitted(
         return list(chosen)
     views = len(source.views)
     pyramids: dict[DepthVariant, Pyramid] = {}
-    depth_s: dict[bool, float] = {}  # of the last image, conservative or plain
+    image_s: dict[bool, tuple[float, int]] = {}  # of the last image, and its divisor
     trial_s: dict[str, float] = {}  # of the last row, by fit
     row_s = 0.0  # of the last row, once it is compiled
     rest_s = 0.0  # what the rows that are in will need
     found: list[Configuration] = []
     for one in chosen:
         variant = one.depth
-        image_s = 0.0
-        if variant not in pyramids:
-            image_s = depth_s.get(variant.conservative, max(depth_s.values(), default=0.0))
+        new_s = 0.0 if variant in pyramids else _expected(image_s, variant)
         tried_s = trial_s.get(one.fit, max(trial_s.values(), default=0.0))
-        needs_s = image_s + tried_s + rest_s + _later(image_s, views)
+        needs_s = new_s + tried_s + rest_s + _later(new_s, views)
         needs_s += LEAST_ROUNDS * views * row_s
         if found and time.monotonic() + needs_s > until:
             continue
         found.append(one)
         if variant not in pyramids:
             pyramids[variant], took = source.pyramids([variant], 0)[variant]
-            depth_s[variant.conservative] = took / 1000.0
+            image_s[variant.conservative] = took / 1000.0, variant.divisor
             rest_s += _later(took / 1000.0, views)
         began = time.monotonic()
         for _ in range(2):  # the first one compiles
@@ -101,6 +102,20 @@ def admitted(
         trial_s[one.fit] = time.monotonic() - began
         rest_s += LEAST_ROUNDS * views * row_s
     return found
+
+
+def _expected(image_s: Mapping[bool, tuple[float, int]], variant: DepthVariant) -> float:
+    """Seconds for an image that was not made yet: as the last of its sort, by its pixels.
+
+    Plain ones are cheaper than conservative ones, which come first.
+    """
+    if not image_s:
+        return 0.0
+    last = image_s.get(variant.conservative)
+    if last is None:
+        return max(took for took, _ in image_s.values())
+    took, divisor = last
+    return took * max(1.0, (divisor / variant.divisor) ** 2)
 
 
 def _later(image_s: float, views: int) -> float:

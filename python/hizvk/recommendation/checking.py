@@ -168,7 +168,8 @@ def hold(
     steps : Progress
         Told of each view of each kind of bounds.
     until : float
-        When to look at no further instances, by `time.monotonic`; some of each view are looked at.
+        When to look at no further instances, by `time.monotonic`.
+        What was not looked at stays unclear where every ray counts.
     """
     turns = len({one.volume for one in chosen} & set(alternatives)) * len(masks[0])
     found = CheckedCandidates(judge.method, [0] * len(chosen), [0] * len(chosen))
@@ -206,7 +207,9 @@ def hold(
                 first = open_ if proven else by_some & ~np.logical_and.reduce(list(culled.values()))
                 room = judge.most if points else judge.most // POINTS
                 asked = _pick(first, by_some & ~first, room, random)
-                asked, shown = _looked(judge, bounds, asked, k, until, turns)
+                # Without a look all stays unclear where every ray counts; the oracle looks at some.
+                least = 0 if every_ray else 1
+                asked, shown = _looked(judge, bounds, asked, k, until, turns, least)
                 visible[asked] = shown
                 open_[asked] &= not points
                 open_ &= ~visible
@@ -222,21 +225,24 @@ def hold(
 
 
 def _looked(
-    judge: Judge, bounds: Bounds, asked: Indices, k: int, until: float, turns: int
+    judge: Judge, bounds: Bounds, asked: Indices, k: int, until: float, turns: int, least: int
 ) -> tuple[Indices, Mask]:
-    """Those that were looked at, and which of them are visible, if `turns` share the time left."""
+    """Those that were looked at, and which of them are visible, if `turns` share the time left.
+
+    At least `least` parts of them are looked at.
+    """
     if until == math.inf:
         return asked, judge.visible(bounds, asked, k)
     last = time.monotonic()
     until = last + (until - last) / turns
-    looked, visible = [], []
+    looked, visible, took = [asked[:0]], [np.zeros(0, np.bool_)], 0.0
     for part in range(PARTS):
+        if part >= least and last + took >= until:
+            break
         looked.append(asked[part::PARTS])
         visible.append(judge.visible(bounds, looked[-1], k))
         now = time.monotonic()
-        if now + (now - last) > until:
-            break
-        last = now
+        last, took = now, now - last
     return np.concatenate(looked), np.concatenate(visible)
 
 

@@ -55,6 +55,7 @@ mod answers;
 mod approximate;
 mod bins;
 mod clock;
+mod converted;
 mod counts;
 mod cull;
 mod culling;

@@ -46,10 +46,9 @@ impl Engine {
         let samples = Samples::new(samples, camera, (0, far_pixels(depths)))?;
         let upload = |end| {
             let image = DepthImage::for_upload(self, camera)?;
-            let first = &samples.conversions[0];
-            let (rows, threads) = (first.band_rows(), first.threads());
+            let threads = samples.conversions[0].threads();
             self.scoped(|| {
-                image.write_bands(rows, threads, |row, band| samples.rows(row, band, end))
+                image.write_converted(threads, |first, rows| samples.rows(first, rows, end))
             })?;
             Ok(image)
         };

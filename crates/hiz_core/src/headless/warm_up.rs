@@ -148,12 +148,12 @@ impl Engine {
         // A capacity that cuts.
         for capacity in [None, Some(instances.len().saturating_sub(1))] {
             let passes = self.two_passes(instances, capacity)?;
-            for set in
-                [EarlyMask::Largest { pixels: 1 }, EarlyMask::LastVisible, EarlyMask::Given(&all)]
-            {
+            for set in [EarlyMask::Largest { pixels: 1 }, EarlyMask::Given(&all)] {
                 passes.early(camera, set)?.mask()?;
             }
             passes.late(camera, pyramid, options)?.mask()?;
+            // Only now is there a history.
+            passes.early(camera, EarlyMask::LastVisible)?.mask()?;
         }
         Ok(())
     }

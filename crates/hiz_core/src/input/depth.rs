@@ -353,12 +353,11 @@ impl<'a> Conversion<'a> {
     /// Converts rows of 16 bits, which `read` turns into float32.
     fn widened(&self, first: u32, stored: &[u16], read: impl Fn(u16) -> f32, out: &mut [f32]) {
         let (width, invalid) = (self.size.width as usize, self.narrow_invalid());
-        let mut numbers = vec![0.0; width];
+        let mut numbers = Vec::with_capacity(width);
         let rows = stored.chunks_exact(width).zip(out.chunks_exact_mut(width));
         for (row, (stored, out)) in (first..).zip(rows) {
-            for (number, stored) in numbers.iter_mut().zip(stored) {
-                *number = read(*stored);
-            }
+            numbers.clear();
+            numbers.extend(stored.iter().map(|stored| read(*stored)));
             self.convert(row, &numbers, &invalid, out);
         }
     }

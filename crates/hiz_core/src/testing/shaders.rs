@@ -215,8 +215,9 @@ pub(in crate::testing) mod tests {
     /// So declarations are looked at here, instead of in every module again.
     pub(in crate::testing) fn covering() -> Vec<(Source, naga::Module)> {
         let mut seen = HashSet::new();
+        // All files of a module are taken in, so it is no `any`, which would stop at the first one.
         let mut has_new = |source: &Source| {
-            source.files().iter().fold(false, |has_new, file| seen.insert(file.path) || has_new)
+            source.files().iter().filter(|file| seen.insert(file.path)).count() > 0
         };
         let sources = all().into_iter().map(|(_, source)| source);
         sources.filter(&mut has_new).map(|s| (s.clone(), parse(&s.text()))).collect()
