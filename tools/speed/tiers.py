@@ -57,7 +57,7 @@ def _above_the_ground(run: Run) -> None:
     scene = run.town(run.extent.crowd, 0.0)
     depth = run.depth(scene, run.extent.images[0][1])
     one, both = run.device.pyramid(depth), run.device.pyramid(depth, depths="both")
-    lift = np.float32([0.0, 0.0, LIFT])
+    lift = np.array([0.0, 0.0, LIFT], np.float32)
     boxes = run.device.instances(Boxes(scene.low + lift, scene.high + lift))
     ms = in_turns(
         {

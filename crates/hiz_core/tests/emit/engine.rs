@@ -1,0 +1,113 @@
+//! What an engine tells of bins, and records that are copied in place of indices.
+
+use hiz_core::headless::NO_LOD;
+use hiz_core::testing::CANARY_WORDS;
+use hiz_core::{ABSENT, CullOptions, Emit, Order, Outputs, wgpu};
+
+use crate::common::Random;
+use crate::expected::{emits, record};
+use crate::{Crowd, World};
+
+/// The record of the first mesh.
+pub(crate) fn first_record(lod: u32, count: usize) -> Vec<u32> {
+    record(true, (0, lod), count, 0)
+}
+
+/// What can be read of an engine's cull: draws, their number, bins and LODs.
+#[test]
+fn an_engines_cull_tells_its_bins() {
+    let world = World::new(&[]);
+    let mut random = Random(5);
+    let lods = [2, 1, 3];
+    let made = Crowd::random(2500, &lods, 0.5, 0.2, &mut random);
+    let crowd = Crowd::new(&world, made, Some(1024), true);
+    let kept = crowd.made.iter().filter(|m| m.is_kept()).count() as u64;
+    let absent = crowd.made.iter().filter(|m| m.mesh == ABSENT).count() as u64;
+    let indices: Vec<u32> = (0..2500).filter(|i: &u32| crowd.made[*i as usize].is_kept()).collect();
+    for emit in emits(&world.table(&lods, true)) {
+        let outputs = Outputs { emit: emit.clone(), ..Outputs::ALL };
+        let options = CullOptions::default();
+        let World { engine, camera, pyramid, .. } = &world;
+        let culling = engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
+        let by_index = culling.lods().unwrap();
+        for (made, lod) in crowd.made.iter().zip(&by_index) {
+            assert_eq!(*lod, if made.is_kept() { made.lod as u8 } else { NO_LOD });
+        }
+        let draws = culling.draws().unwrap();
+        assert_eq!(draws.len(), 3 * culling.visible().max_draws() as usize);
+        assert_eq!(draws.iter().map(|d| u64::from(d.instance_count)).sum::<u64>(), kept);
+        let counts = culling.draw_counts().unwrap();
+        let used = draws.iter().filter(|d| d.instance_count > 0).count() as u32;
+        assert_eq!(counts.iter().sum::<u32>(), used);
+        assert_eq!(culling.demand_and_written().unwrap(), (Some(kept), kept));
+        // Mask, list and verdicts are those of any cull.
+        assert_eq!(culling.indices().unwrap(), indices);
+        assert_eq!(culling.mask().unwrap().iter().filter(|kept| **kept).count() as u64, kept);
+        let counts = culling.counts().unwrap();
+        assert_eq!((counts.absent, counts.tested, counts.visible), (absent, 2500 - absent, kept));
+        assert_eq!((counts.outside, counts.occluded), (0, 2500 - absent - kept));
+        let Emit::Binned { .. } = emit else {
+            assert!(culling.bin(0, 0).unwrap_err().to_string().contains("Emit::Instances"));
+            continue;
+        };
+        for (mesh, lods) in (0..).zip(lods) {
+            for lod in 0..lods as u32 {
+                let of_pieces = crowd.pieces();
+                let all = of_pieces.iter().flat_map(|p| crowd.bin(p, mesh, lod));
+                assert_eq!(culling.bin(mesh, lod).unwrap(), all.collect::<Vec<_>>());
+            }
+            assert!(culling.bin(mesh, lods as u32).unwrap_err().to_string().starts_with("lod: "));
+        }
+        assert!(culling.bin(3, 0).unwrap_err().to_string().starts_with("mesh: expected"));
+        // Without a mask, too, more is known than what was written.
+        let outputs = Outputs { indices: true, capacity: Some(9), emit, ..Outputs::NONE };
+        let culling = engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
+        assert_eq!(culling.demand_and_written().unwrap(), (Some(kept), 9));
+    }
+}
+
+/// The caller's records are listed in place of indices.
+#[test]
+fn records_are_copied_in_place_of_indices() {
+    let world = World::new(&[]);
+    let mut random = Random(6);
+    for (n, piece, stride) in [(3000, Some(384), 4), (700, None, 256), (3000, Some(1024), 36)] {
+        let made = Crowd::random(n, &[1], 0.4, 0.1, &mut random);
+        let crowd = Crowd::new(&world, made, piece, true);
+        let words = stride as usize / 4;
+        let data: Vec<u32> =
+            (0..n * words).map(|i| (i as u32).wrapping_mul(2_654_435_761)).collect();
+        let records = world.engine.device().create_buffer(&wgpu::BufferDescriptor {
+            label: Some("test.records"),
+            size: 4 * data.len() as u64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let bytes: Vec<u8> = data.iter().flat_map(|word| word.to_le_bytes()).collect();
+        world.engine.queue().write_buffer(&records, 0, &bytes);
+        let emit = Emit::Copy { records, stride };
+        for capacity in [None, Some(0), Some(100), Some(n as u32)] {
+            let outputs = Outputs { indices: true, capacity, emit: emit.clone(), ..Outputs::NONE };
+            let visible =
+                world.engine.context().create_visible(&crowd.instances, &outputs).unwrap();
+            world.cull(&crowd, &visible, &CullOptions::default()).unwrap();
+            let draws = world.words(visible.draw_arguments().unwrap());
+            let mut room = capacity.map_or(n, |c| c as usize);
+            for (p, piece) in crowd.pieces().iter().enumerate() {
+                let kept = piece.clone().filter(|i| crowd.made[*i].is_kept());
+                let kept: Vec<usize> = kept.take(room).collect();
+                room -= kept.len();
+                assert_eq!(draws[5 * p + 1] as usize, kept.len());
+                let list = world.words(visible.list(p).unwrap());
+                let want = kept.iter().flat_map(|i| &data[i * words..(i + 1) * words]);
+                let (got, behind) = list.split_at(kept.len() * words);
+                assert!(got.iter().eq(want), "{n} {stride} {capacity:?} {p}");
+                assert!(behind.iter().all(|word| *word == u32::MAX), "past the end");
+                assert!(behind.len() >= CANARY_WORDS as usize);
+            }
+            let options = CullOptions { order: Order::Any, ..CullOptions::default() };
+            let text = world.cull(&crowd, &visible, &options).unwrap_err().to_string();
+            assert!(text.starts_with("order: expected Order::Stable for Emit::Copy"), "{text}");
+        }
+    }
+}
