@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 import hizvk
-from hizvk.bounds import Spheres
+from hizvk.bounds import Points, Spheres
 
 from .rounds import in_turns
 
@@ -93,7 +93,8 @@ def _single(run: Run) -> None:
         pyramid = device.pyramid(image, camera, kind=kind)
         return device.cull(device.instances(boxes), camera, pyramid).mask
 
-    points = Spheres(np.repeat((scene.low + scene.high) / 2, 4, axis=0), 0.0)
+    points = Points(np.repeat((scene.low + scene.high) / 2, 4, axis=0))
+    spheres = Spheres(points.positions, 0.0)
     ways: dict[str, Callable[[], float]] = {
         "visible": _timed(
             run, lambda: hizvk.visible(boxes, camera, depth=image, kind=kind, device=device)
@@ -102,13 +103,16 @@ def _single(run: Run) -> None:
         "visible, points": _timed(
             run, lambda: hizvk.visible(points, camera, depth=image, kind=kind, device=device)
         ),
+        "visible, spheres of radius 0": _timed(
+            run, lambda: hizvk.visible(spheres, camera, depth=image, kind=kind, device=device)
+        ),
     }
     test = numba_test()
     if test is None:
         run.found.notes.append(f"left out: {MISSING}")
     else:
         matrix = camera.clip_from_world
-        ways["numba, points"] = _timed(run, lambda: test(points.centers, matrix, image))
+        ways["numba, points"] = _timed(run, lambda: test(points.positions, matrix, image))
     ms = in_turns(ways, max(3, run.extent.rounds // 3))
     run.found.timed("single calls", ms)
     count = f"{len(boxes):,}"
@@ -125,6 +129,12 @@ def _single(run: Run) -> None:
             ms["visible, points"],
             ms["numba, points"],
             3.0,
+        )
+        run.found.ratio(
+            "arrays.spheres",
+            f"visible of {len(points):,} spheres of radius 0 / numba's z-test on one thread",
+            ms["visible, spheres of radius 0"],
+            ms["numba, points"],
         )
 
 

@@ -97,7 +97,16 @@ fn culls_of_split_pyramids_give_no_false_cull() {
 ///
 /// Checks that exactly the instances known to be visible are kept.
 fn crowd(engine: &Engine, piece: Option<u32>, hierarchy: Hierarchy, order: Order) -> bool {
-    let count: usize = 300_000;
+    crowd_of(300_000, engine, piece, hierarchy, order)
+}
+
+fn crowd_of(
+    count: usize,
+    engine: &Engine,
+    piece: Option<u32>,
+    hierarchy: Hierarchy,
+    order: Order,
+) -> bool {
     let mut random = Random(6);
     // One in sixteen is in front of the wall, so that nearly every group survives.
     let kept: Vec<bool> = (0..count).map(|_| random.below(16) == 0).collect();
@@ -140,6 +149,15 @@ fn three_hundred_thousand_instances() {
         (Some(1 << 17), Hierarchy::Auto, Order::Stable),
     ] {
         assert!(crowd(&engine(), piece, hierarchy, order), "{piece:?} {hierarchy:?} {order:?}");
+    }
+}
+
+/// Records of 64 MiB, which are staged in several parts (`MANY` in `instances/records.rs`).
+#[test]
+fn two_million_instances() {
+    for hierarchy in [Hierarchy::Never, Hierarchy::Auto] {
+        let kept = crowd_of(2_100_003, &engine(), None, hierarchy, Order::Stable);
+        assert!(kept, "{hierarchy:?}");
     }
 }
 

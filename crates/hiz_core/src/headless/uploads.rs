@@ -34,12 +34,15 @@ impl Engine {
         options: &InstanceOptions<'_>,
         has_groups: bool,
     ) -> Result<Arc<Instances>> {
-        // Waits after each piece, so that only one piece has a staging buffer at a time.
+        // One part is copied while the next one is packed.
+        // So no more than two have a staging buffer at a time.
+        let mut before = None;
         let copy = |copies: &dyn Fn(&mut wgpu::CommandEncoder), more: bool| {
             let mut encoder = self.encoder("hiz.instances.encoder");
             copies(&mut encoder);
             let submission = self.queue().submit([encoder.finish()]);
-            if more { readback::wait(self.device(), Some(submission)) } else { Ok(()) }
+            let before = before.replace(submission);
+            if before.is_some() && more { readback::wait(self.device(), before) } else { Ok(()) }
         };
         let gpu = &self.context().gpu;
         self.scoped(|| Instances::new(gpu, bounds, options, has_groups, copy)).map(Arc::new)

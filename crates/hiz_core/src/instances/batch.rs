@@ -11,6 +11,7 @@ use wgpu::WriteOnly;
 
 use crate::input::bounds::{Bounds, BoundsKind, Floats};
 use crate::instances::aabb::Aabb;
+use crate::instances::narrow::{Fetched, are_all, around_spheres, round_up_from_0};
 use crate::instances::point::{PointRecord, WidePointRecord};
 use crate::instances::volume_record::{BoxRecord, LARGEST, OrientedBoxRecord, SphereRecord};
 use crate::instances::write_record::write_absent;
@@ -44,6 +45,8 @@ pub(super) enum Boxes {
     Each,
     /// One for all volumes, where that is quicker.
     Whole,
+    /// None at all.
+    None,
 }
 
 /// Scratch memory for packing some members of one group.
@@ -57,6 +60,7 @@ pub(super) struct Batch {
     ones: [f64; GROUP],
     nines: [f64; 9 * GROUP],
     records: [u8; GROUP * LARGEST_RECORD],
+    narrow: Fetched<{ 3 * GROUP }, GROUP>,
 }
 
 type Threes = [f64; 3 * GROUP];
@@ -72,13 +76,15 @@ impl Batch {
             ones: [0.0; GROUP],
             nines: [0.0; 9 * GROUP],
             records: [0; GROUP * LARGEST_RECORD],
+            narrow: Fetched::new(),
         }
     }
 
     /// Packs the volumes `sources` of `bounds` into the beginning of `target`.
     /// The records are those of `kind`.
     /// Bit k of `absent`: number k is absent, whatever its bounds are.
-    /// Calls `tell` with the boxes around them; that of an absent one is empty.
+    /// Calls `tell` with those boxes around them that are asked for; that of an absent one is
+    /// empty.
     /// Returns the rest of `target`.
     pub(super) fn pack<'a>(
         &mut self,
@@ -89,11 +95,25 @@ impl Batch {
         mut tell: impl FnMut(Around),
     ) -> WriteOnly<'a, [u8]> {
         let count = sources.len();
-        let Self { indices, sources: from, threes: [first, second], ones, nines, records } = self;
+        let Self { indices, sources: from, threes: [first, second], ones, nines, records, narrow } =
+            self;
         for ((index, from), origin) in indices.iter_mut().zip(from.iter_mut()).zip(sources) {
             (*index, *from) = (origin.index, origin.bounds);
         }
         let from = &from[..count];
+        let record_bytes = kind.record_bytes() as usize;
+        if absent == 0
+            && boxes != Boxes::Each
+            && kind != BoundsKind::WidePoint
+            && narrow.pack(bounds, from, indices, &mut records[..count * record_bytes])
+        {
+            if boxes == Boxes::Whole {
+                tell(Around::All(narrow.around(bounds, count)));
+            }
+            let (mut here, rest) = target.split_at(count * record_bytes);
+            here.copy_from_slice(&records[..count * record_bytes]);
+            return rest;
+        }
         match bounds {
             Bounds::Spheres { centers, radii } => {
                 fetch::<3>(centers, from, first);
@@ -117,15 +137,15 @@ impl Batch {
             Bounds::OrientedBoxes { .. } => false,
             Bounds::Points { .. } => plain_points(first, kind, indices, count, records),
         };
-        let record_bytes = kind.record_bytes() as usize;
         let around_all = match bounds {
-            Bounds::Boxes { .. } if are_plain && boxes == Boxes::Whole => {
-                Some(around_boxes(&first[..3 * count], &second[..3 * count]))
+            _ if !(are_plain && boxes == Boxes::Whole) => None,
+            Bounds::Boxes { .. } => Some(around_boxes(&first[..3 * count], &second[..3 * count])),
+            Bounds::Points { .. } => Some(around_boxes(&first[..3 * count], &first[..3 * count])),
+            Bounds::Spheres { .. } => {
+                let centers = first.as_chunks().0.iter().take(count).copied();
+                Some(around_spheres(centers.zip(ones.iter().copied())))
             }
-            Bounds::Points { .. } if are_plain && boxes == Boxes::Whole => {
-                Some(around_boxes(&first[..3 * count], &first[..3 * count]))
-            }
-            _ => None,
+            Bounds::OrientedBoxes { .. } => None,
         };
         let (first, second) = (Floats::F64(first), Floats::F64(second));
         let fetched = match bounds {
@@ -141,7 +161,9 @@ impl Batch {
         if let Some(around) = around_all {
             tell(Around::All(around));
         } else if are_plain {
-            (0..count).for_each(|k| tell(Around::One(k, fetched.aabb(k))));
+            if boxes == Boxes::Each {
+                (0..count).for_each(|k| tell(Around::One(k, fetched.aabb(k))));
+            }
         } else {
             for (k, record) in records.chunks_exact_mut(record_bytes).take(count).enumerate() {
                 if absent >> k & 1 == 1 {
@@ -150,7 +172,9 @@ impl Batch {
                     continue;
                 }
                 let is_volume = fetched.write_record(k, indices[k], record);
-                tell(Around::One(k, fetched.aabb(k).filter(|_| is_volume)));
+                if boxes != Boxes::None {
+                    tell(Around::One(k, fetched.aabb(k).filter(|_| is_volume)));
+                }
             }
         }
         let (mut here, rest) = target.split_at(count * record_bytes);
@@ -228,19 +252,6 @@ impl Halves {
     fn lo(&self, k: usize) -> [f32; 3] {
         [self.lo[3 * k], self.lo[3 * k + 1], self.lo[3 * k + 2]]
     }
-}
-
-/// `all` without an early end, which would keep a compiler from making vectors.
-fn are_all(each: impl Iterator<Item = bool>) -> bool {
-    each.fold(0_u32, |wrong, is_so| wrong | u32::from(!is_so)) == 0
-}
-
-/// `round_up` of numbers from 0 on.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "rounded up in the next line")]
-fn round_up_from_0(v: f64) -> f32 {
-    let nearest = v as f32;
-    f32::from_bits(nearest.to_bits() + u32::from(f64::from(nearest) < v))
 }
 
 /// `next_up` of numbers from 0 on, where `is_so`.

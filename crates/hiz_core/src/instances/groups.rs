@@ -15,6 +15,8 @@
 //! - Once every member was moved at least once, the group is as tight as a new one.
 //! - A group that never moves, or moves as a whole, costs 88 bytes on the host.
 
+use std::ops::Range;
+
 use crate::error::{Error, Result};
 use crate::gpu::buffers::Mapped;
 use crate::host::memory;
@@ -49,6 +51,32 @@ fn on_parts<T: Send>(
         spare_batches.lock().push(batch);
     });
     failed.lock().take().map_or(Ok(()), Err)
+}
+
+/// Writes the records of instances that are culled one by one, once: no groups are formed.
+pub(crate) fn pack_without_groups(
+    (bounds, kind): (&Bounds<'_>, BoundsKind),
+    places: Range<usize>,
+    source: impl Fn(usize) -> Origin + Sync,
+    records: &Mapped<'_>,
+) -> Result<()> {
+    let parts = places.clone().step_by(PART * GROUP);
+    on_parts(places.len(), parts, |first: usize, batch| {
+        let part = first..places.end.min(first + PART * GROUP);
+        let mut view = records.range(bytes_of(&part, places.start, kind))?;
+        let mut rest = view.slice(..);
+        for first in part.clone().step_by(GROUP) {
+            let sources = (first..part.end.min(first + GROUP)).map(&source);
+            rest = batch.pack((bounds, kind), sources, rest, (Boxes::None, 0), |_| ());
+        }
+        Ok(())
+    })
+}
+
+/// Where the records of `places` lie in a buffer that begins with that of place `first`.
+fn bytes_of(places: &Range<usize>, first: usize, kind: BoundsKind) -> Range<u64> {
+    let at = |place: usize| (place - first) as u64 * kind.record_bytes();
+    at(places.start)..at(places.end)
 }
 
 #[derive(Debug)]
@@ -119,24 +147,30 @@ fn all_members(count: usize, group: usize) -> u64 {
 }
 
 impl Groups {
-    /// Writes the records of a piece's instances to `records` in stored order, and forms their
-    /// groups.
-    /// `source` says which instance is stored at a place of the piece.
+    /// Groups of `count` instances, which [`Groups::pack`] fills.
     /// `absent` has a word per group, with a bit for each absent member, or no word at all.
-    pub(crate) fn packed(
-        (bounds, kind): (&Bounds<'_>, BoundsKind),
-        count: usize,
-        absent: Vec<u64>,
-        source: impl Fn(usize) -> Origin + Sync,
-        records: &Mapped<'_>,
-    ) -> Result<Self> {
+    pub(crate) fn new(count: usize, absent: Vec<u64>) -> Result<Self> {
         let mut groups = memory::list(count.div_ceil(GROUP), "groups")?;
         groups.resize_with(count.div_ceil(GROUP), Group::new);
-        let record_bytes = kind.record_bytes();
-        let parts = (0..).step_by(PART).zip(groups.chunks_mut(PART));
-        on_parts(count, parts, |(begin, groups): (usize, &mut [Group]), batch| {
-            let (first, end) = (begin * GROUP, count.min((begin + groups.len()) * GROUP));
-            let mut view = records.range(first as u64 * record_bytes..end as u64 * record_bytes)?;
+        Ok(Self { count, groups, absent })
+    }
+
+    /// Forms the groups `range`, and writes the records of their members to `records` in stored
+    /// order.
+    /// `source` says which instance is stored at a place of the piece.
+    pub(crate) fn pack(
+        &mut self,
+        (bounds, kind): (&Bounds<'_>, BoundsKind),
+        range: Range<usize>,
+        source: impl Fn(usize) -> Origin + Sync,
+        records: &Mapped<'_>,
+    ) -> Result<()> {
+        let (count, absent) = (self.count, &self.absent);
+        let places = range.start * GROUP..count.min(range.end * GROUP);
+        let parts = range.clone().step_by(PART).zip(self.groups[range].chunks_mut(PART));
+        on_parts(places.len(), parts, |(begin, groups): (usize, &mut [Group]), batch| {
+            let part = begin * GROUP..places.end.min((begin + groups.len()) * GROUP);
+            let mut view = records.range(bytes_of(&part, places.start, kind))?;
             let mut rest = view.slice(..);
             for (g, group) in (begin..).zip(groups) {
                 let sources = (g * GROUP..count.min((g + 1) * GROUP)).map(&source);
@@ -150,30 +184,7 @@ impl Groups {
                 });
             }
             Ok(())
-        })?;
-        Ok(Self { count, groups, absent })
-    }
-
-    /// Writes the records of instances that are culled one by one, once: no groups are formed.
-    pub(crate) fn without_groups(
-        (bounds, kind): (&Bounds<'_>, BoundsKind),
-        count: usize,
-        source: impl Fn(usize) -> Origin + Sync,
-        records: &Mapped<'_>,
-    ) -> Result<Self> {
-        let record_bytes = kind.record_bytes();
-        let parts = (0..count).step_by(PART * GROUP);
-        on_parts(count, parts, |first: usize, batch| {
-            let end = count.min(first + PART * GROUP);
-            let mut view = records.range(first as u64 * record_bytes..end as u64 * record_bytes)?;
-            let mut rest = view.slice(..);
-            for first in (first..end).step_by(GROUP) {
-                let sources = (first..end.min(first + GROUP)).map(&source);
-                rest = batch.pack((bounds, kind), sources, rest, (Boxes::Whole, 0), |_| ());
-            }
-            Ok(())
-        })?;
-        Ok(Self::unknown(count))
+        })
     }
 
     /// Of a piece whose group boxes are made on the device: the host knows none.

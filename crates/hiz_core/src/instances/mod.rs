@@ -3,11 +3,12 @@
 //! The data goes through these files:
 //!
 //! 1. `piece` cuts the instances of one call into pieces that fit a binding and a dispatch.
-//! 2. `order` and `morton` choose where each instance is stored: along a curve through space.
+//! 2. `order`, `morton` and `keys` choose where each instance is stored: along a curve through
+//!    space.
 //! 3. `groups` and `aabb` form groups of 64 neighbours with a box around each.
 //!    `tiers` forms boxes around 64 of these boxes each, and so on.
-//! 4. `volume_record`, `point`, `write_record`, `batch` and `records` write the records that the
-//!    cull reads.
+//! 4. `volume_record`, `point`, `write_record`, `batch`, `narrow` and `records` write the records
+//!    that the cull reads.
 //! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
 //! 6. `from_buffer` takes bounds that a shader of the caller's has written.
 //!
@@ -22,7 +23,9 @@ pub(crate) mod batch;
 pub(crate) mod forming;
 pub(crate) mod from_buffer;
 pub(crate) mod groups;
+pub(crate) mod keys;
 pub(crate) mod morton;
+pub(crate) mod narrow;
 pub(crate) mod order;
 pub(crate) mod piece;
 pub(crate) mod point;
@@ -170,11 +173,11 @@ pub struct Instances {
 }
 
 impl Instances {
-    /// Packs the pieces one by one, and calls `copy` for each.
+    /// Packs the pieces one by one, large ones in parts, and calls `copy` for each part.
     ///
-    /// `copy` gets a function that records the copies of the piece into an encoder.
-    /// It also learns whether more pieces follow.
-    /// A caller with a queue can submit then, and release the piece's staging buffers.
+    /// `copy` gets a function that records the copies of the part into an encoder.
+    /// It also learns whether more parts follow.
+    /// A caller with a queue can submit then, and release the part's staging buffer.
     /// Without groups, the instances are for one cull that tests none, and for no update.
     pub(crate) fn new(
         gpu: &Gpu,
@@ -195,8 +198,11 @@ impl Instances {
         for index in 0..num_pieces {
             let start = index * capacity;
             let range = start..total.min(start.saturating_add(capacity));
+            let stored = (options.order, &kinds);
             let (piece, its_groups, uploads) =
-                packed(gpu, (bounds, kind), index, range, (options.order, &kinds), has_groups)?;
+                packed(gpu, (bounds, kind), index, range, stored, has_groups, |upload| {
+                    copy(&|encoder| upload.record(encoder), true)
+                })?;
             let forming = Forming::all(gpu, &piece)?;
             let record = |encoder: &mut wgpu::CommandEncoder| {
                 uploads.iter().for_each(|upload| upload.record(encoder));

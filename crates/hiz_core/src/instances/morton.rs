@@ -14,25 +14,12 @@
 use std::ops::{Range, RangeInclusive};
 
 use crate::error::Result;
-use crate::host::curve::spread;
 use crate::host::memory;
 use crate::host::threads::{cores, on_threads};
 use crate::input::bounds::Bounds;
+use crate::instances::keys::Cube;
 
-/// Bits of a cell's number along each axis.
-const AXIS_BITS: u32 = 19;
-
-/// The bits above the cell's three numbers hold the number of the cube: 63 bits in all.
-const CUBE_SHIFT: u32 = 3 * AXIS_BITS;
-
-/// The last cube also takes whatever lies outside it: coordinates beyond 2^60, which no record
-/// holds.
-const LAST_CUBE: u64 = 63;
-
-/// The key of invalid bounds: after every cell of every cube.
-const INVALID: u64 = u64::MAX;
-
-/// The most centres that are sampled to place the innermost cube.
+/// The most keys that are sampled to split the curve into parts.
 const SAMPLES: usize = 4096;
 
 /// From this many instances on, more threads help to sort.
@@ -49,80 +36,6 @@ const KEYED_AT_A_TIME: usize = 1 << 13;
 /// A piece has at most 2^24 instances.
 const INDEX_BITS: u32 = 24;
 
-/// The innermost cube.
-#[derive(Debug, Clone, Copy)]
-struct Cube {
-    center: [f64; 3],
-    /// 1 / half the size.
-    per_half_size: f64,
-}
-
-impl Cube {
-    /// Places the innermost cube by a sample of the centres.
-    ///
-    /// The cube's centre is the median along each axis.
-    /// Its half size is the width of the middle eight tenths of the sample, along the widest axis;
-    /// if that is 0, the width of the whole sample.
-    /// If the centres are spread evenly, the cube holds all of them.
-    /// A tenth of outliers on each side cannot move it.
-    fn new(bounds: &Bounds<'_>, range: &Range<usize>) -> Result<Self> {
-        let step = range.len().div_ceil(SAMPLES).max(1);
-        let mut axes: [Vec<f64>; 3] = [
-            memory::list(SAMPLES, "order")?,
-            memory::list(SAMPLES, "order")?,
-            memory::list(SAMPLES, "order")?,
-        ];
-        for aabb in range.clone().step_by(step).filter_map(|i| bounds.aabb(i)) {
-            for (axis, value) in axes.iter_mut().zip(aabb.center()) {
-                axis.push(value);
-            }
-        }
-        let samples = axes[0].len();
-        if samples == 0 {
-            return Ok(Self { center: [0.0; 3], per_half_size: 1.0 });
-        }
-        for axis in &mut axes {
-            axis.sort_unstable_by(f64::total_cmp);
-        }
-        let widest =
-            |low: usize, high: usize| axes.iter().map(|a| a[high] - a[low]).fold(0.0, f64::max);
-        let tenth = samples / 10;
-        let width = [widest(tenth, samples - 1 - tenth), widest(0, samples - 1)]
-            .into_iter()
-            .find(|w| *w > 0.0);
-        // An extent below 2^-100 counts as a point; from there 63 cubes still reach past 2^60.
-        let half_size = width.unwrap_or(0.0).clamp(1.0 / 2.0_f64.powi(100), 2.0_f64.powi(60));
-        Ok(Self { center: axes.map(|a| a[samples / 2]), per_half_size: half_size.recip() })
-    }
-
-    #[inline]
-    fn key(&self, center: [f64; 3]) -> u64 {
-        let from_center: [f64; 3] =
-            std::array::from_fn(|k| (center[k] - self.center[k]) * self.per_half_size);
-        let distance = from_center.iter().fold(0.0, |d: f64, v| d.max(v.abs()));
-        let cube = if distance < 1.0 { 0 } else { (exponent(distance) / 3 + 1).min(LAST_CUBE) };
-        // The cube has 2^18 cells on each side of its centre.
-        // The clamp takes what lies outside the last cube.
-        let cells = f64::from(1_u32 << (AXIS_BITS - 1));
-        let scale = cells * per_power_of_8(cube);
-        let last = f64::from((1_u32 << AXIS_BITS) - 1);
-        // Processors have an instruction for this type of integer.
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-        let cell = from_center.map(|v| (v * scale + cells).clamp(0.0, last) as i32 as u64);
-        cube << CUBE_SHIFT | spread(cell[0]) << 2 | spread(cell[1]) << 1 | spread(cell[2])
-    }
-}
-
-/// The binary exponent of a finite number >= 1.
-fn exponent(v: f64) -> u64 {
-    (v.to_bits() >> 52) - 1023
-}
-
-/// 8 to the power of -`power`.
-fn per_power_of_8(power: u64) -> f64 {
-    f64::from_bits((1023 - 3 * power) << 52)
-}
-
 /// The instances of `range` along the curve, as indices relative to its start.
 ///
 /// Instances with equal keys keep the caller's order, and invalid bounds come last.
@@ -132,16 +45,16 @@ fn per_power_of_8(power: u64) -> f64 {
 /// the others.
 pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>> {
     let cube = Cube::new(bounds, &range)?;
-    let key = |index: usize| {
-        bounds.aabb(range.start + index).map_or(INVALID, |aabb| cube.key(aabb.center()))
-    };
+    let key = |index: usize| cube.key_of(bounds, range.start + index);
     let threads = if range.len() < PARALLEL_FROM { 1 } else { cores().min(MOST_PARTS) };
     let mut words = memory::list(range.len(), "order")?;
     words.resize(range.len(), 0);
     let parts = words.chunks_mut(KEYED_AT_A_TIME).enumerate();
-    on_threads(threads, parts, |(part, words)| {
-        for (index, word) in (part * KEYED_AT_A_TIME..).zip(words) {
-            *word = key(index) >> INDEX_BITS << INDEX_BITS | index as u64;
+    on_threads(threads, parts, |(part, words): (usize, &mut [u64])| {
+        let first = part * KEYED_AT_A_TIME;
+        cube.keys(bounds, range.start + first, words);
+        for (index, word) in (first..).zip(words) {
+            *word = *word >> INDEX_BITS << INDEX_BITS | index as u64;
         }
     });
     let mut sorted: Vec<Result<Vec<u64>>> = (0..threads).map(|_| Ok(Vec::new())).collect();
@@ -248,6 +161,7 @@ fn radix_sort(words: &mut [u64], spare: &mut [u64]) {
 mod tests {
     use super::*;
     use crate::input::bounds::Floats;
+    use crate::instances::keys::INVALID;
 
     /// Marsaglia's xorshift.
     struct Random(u64);
@@ -311,14 +225,18 @@ mod tests {
         assert_eq!(order(&bounds, 2..5).unwrap(), [1, 0, 2], "relative to the range's start");
     }
 
-    /// Centres far apart, centres in one cell of the 40 bits, and both.
+    /// Centres far apart, on a line so that many have their 40 highest bits in common, and in few
+    /// places.
     #[test]
     fn the_order_is_that_of_the_whole_keys() {
         let n = PARALLEL_FROM + 77;
-        for (step, size) in [(1.0, 16.0), (1e-7, 1000.0), (1e-3, 1e6)] {
+        for (step, size, axes) in [(1.0, 16.0, 3), (1e-7, 1e3, 3), (1e-3, 1e6, 3), (1e-3, 1e6, 1)] {
             let mut random = Random(5);
-            let mut centers: Vec<_> =
-                (0..3 * n).map(|_| step * (random.unit() * size).floor()).collect();
+            let mut number = |i: usize| {
+                let v = step * (random.unit() * size).floor();
+                if i % 3 < axes { v } else { 0.0 }
+            };
+            let mut centers: Vec<_> = (0..3 * n).map(&mut number).collect();
             centers[..3].fill(1e4);
             let radii = vec![0.0; n];
             let bounds =
@@ -329,6 +247,11 @@ mod tests {
             expected.sort_by_key(|i| key(*i));
             // Not `assert_eq`, which would print all of them.
             assert!(order(&bounds, 0..n).unwrap() == expected, "{step} {size}");
+            let alike = expected.windows(2).filter(|pair| {
+                let [a, b] = [key(pair[0]), key(pair[1])];
+                a != b && a >> INDEX_BITS == b >> INDEX_BITS
+            });
+            assert!(axes == 3 || alike.count() > 1000, "{step} {size}");
         }
     }
 

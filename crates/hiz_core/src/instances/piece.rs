@@ -10,7 +10,7 @@ use crate::gpu::kept::KeptBindings;
 use crate::input::bounds::{Bounds, BoundsKind};
 use crate::instances::batch::GROUP;
 use crate::instances::batch::Origin;
-use crate::instances::groups::Groups;
+use crate::instances::groups::{Groups, pack_without_groups};
 use crate::instances::order::{PieceOrder, StoredOrder};
 pub(crate) use crate::instances::records::{RECORD_BINDINGS, bind_records, bind_records_among};
 use crate::instances::records::{RECORDS_PER_ROW, Records, Upload};
@@ -120,6 +120,9 @@ impl Piece {
 }
 
 /// Makes a piece, its groups, and the uploads that bring both to the device.
+///
+/// Large pieces are staged in several parts.
+/// `stage` takes the upload of each part but the last before the next one is packed.
 pub(super) fn packed(
     gpu: &Gpu,
     (bounds, kind): (&Bounds<'_>, BoundsKind),
@@ -127,9 +130,9 @@ pub(super) fn packed(
     range: Range<u32>,
     (order, kinds): (StoredOrder, &Kinds<'_>),
     has_groups: bool,
+    mut stage: impl FnMut(&Upload) -> Result<()>,
 ) -> Result<(Piece, Groups, Vec<Upload>)> {
     let (first, count) = (range.start as usize, range.end - range.start);
-    let record_bytes = kind.record_bytes();
     let indices = first..range.end as usize;
     let order = PieceOrder::new(bounds, indices.clone(), order)?;
     let absent = kinds.absent(&indices, &order)?;
@@ -138,23 +141,40 @@ pub(super) fn packed(
         bounds: first + order.index(place),
         index: order.index(place) as u32,
     };
-    let (records, upload, groups) =
-        Records::new(gpu, RECORDS_LABEL, count, record_bytes, |records| {
+    let mut groups = if has_groups {
+        Groups::new(count as usize, absent)?
+    } else {
+        Groups::unknown(count as usize)
+    };
+    let records = Records::unwritten(gpu, RECORDS_LABEL, count, kind.record_bytes())?;
+    let mut uploads = Vec::new();
+    for rows in records.bands() {
+        let begin = (rows.start * RECORDS_PER_ROW) as usize;
+        let places = begin..(rows.end * RECORDS_PER_ROW).min(count) as usize;
+        for upload in uploads.drain(..) {
+            stage(&upload)?;
+        }
+        let (upload, ()) = records.staged(gpu, RECORDS_LABEL, rows, |staged| {
             if has_groups {
-                Groups::packed((bounds, kind), count as usize, absent, source, records)
+                let of_band = begin / GROUP..places.end.div_ceil(GROUP);
+                groups.pack((bounds, kind), of_band, source, staged)
             } else {
-                Groups::without_groups((bounds, kind), count as usize, source, records)
+                pack_without_groups((bounds, kind), places, source, staged)
             }
         })?;
+        uploads.push(upload);
+    }
     let num_groups = groups.len() as u32;
     let (group_records, groups_upload, ()) =
         Records::new(gpu, GROUPS_LABEL, num_groups, BOX_BYTES, |boxes| {
             let records = (0..groups.len()).map(|g| groups.record(g));
             if groups.len() > 0 { write_boxes(boxes, records) } else { Ok(()) }
         })?;
+    uploads.push(groups_upload);
+    uploads.extend(slots_upload);
     let order = (order, slots);
     let piece = assembled(gpu, (index, range), num_groups, records, group_records, order)?;
-    Ok((piece, groups, [upload, groups_upload].into_iter().chain(slots_upload).collect()))
+    Ok((piece, groups, uploads))
 }
 
 /// Makes a piece whose records and group boxes are written on the device, in the caller's order.
@@ -265,3 +285,5 @@ mod tests {
         }
     }
 }
+
+const _: () = assert!((RECORDS_PER_ROW as usize).is_multiple_of(GROUP), "rows hold whole groups");

@@ -4,6 +4,8 @@
 //! From a buffer it would fetch the words one by one (`docs/performance.md`).
 //! Twin: `shaders/instances/record_layout.wgsl`.
 
+use std::ops::Range;
+
 use crate::error::Result;
 use crate::gpu::buffers::{Mapped, entry};
 use crate::gpu::device::Gpu;
@@ -39,7 +41,18 @@ pub(crate) struct Records {
 pub(crate) struct Upload {
     staging: wgpu::Buffer,
     texture: wgpu::Texture,
+    /// The rows of the texture that they are copied to.
+    rows: Range<u32>,
 }
+
+/// The most bytes that are staged at once, of records that are more.
+///
+/// Such buffers lie in a block of 64 MiB that wgpu keeps.
+/// A buffer as large as the block has memory of its own, all of whose pages are new to the process.
+const STAGED: u64 = 16 << 20;
+/// From this many bytes on, records are staged in several buffers.
+/// Fewer go through one, because a texture that is written in parts is cleared first.
+const MANY: u64 = 64 << 20;
 
 impl Records {
     /// Makes room for `count` records; `fill` writes them into mapped memory.
@@ -73,15 +86,36 @@ impl Records {
         texture_usage: wgpu::TextureUsages,
         fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
     ) -> Result<(Self, Upload, T)> {
-        let columns = Self::columns(count);
-        let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
-        let size = u64::from(columns) * u64::from(rows) * record_bytes;
+        let records = Self::made(gpu, label, (count, record_bytes), texture_usage)?;
+        let rows = 0..records.texture.height();
+        let (upload, filled) = records.staged(gpu, label, rows, fill)?;
+        Ok((records, upload, filled))
+    }
+
+    /// The parts in which these records are staged: rows of the texture.
+    pub(crate) fn bands(&self) -> impl Iterator<Item = Range<u32>> + use<> {
+        let (row, rows) = (self.row_bytes(), self.texture.height());
+        let band = if row * u64::from(rows) < MANY { rows } else { (STAGED / row).max(1) as u32 };
+        (0..rows).step_by(band as usize).map(move |first| first..rows.min(first + band))
+    }
+
+    /// Stages the records of some rows; `fill` writes them into mapped memory.
+    pub(crate) fn staged<T>(
+        &self,
+        gpu: &Gpu,
+        label: &str,
+        rows: Range<u32>,
+        fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
+    ) -> Result<(Upload, T)> {
+        let size = self.row_bytes() * rows.len() as u64;
         // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into this one.
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
         let (staging, filled) = gpu.written(label, size, usage, fill)?;
-        let records = Self::made(gpu, label, (count, record_bytes), texture_usage)?;
-        let texture = records.texture.clone();
-        Ok((records, Upload { staging, texture }, filled))
+        Ok((Upload { staging, texture: self.texture.clone(), rows }, filled))
+    }
+
+    fn row_bytes(&self) -> u64 {
+        TEXEL_BYTES * u64::from(self.texture.width())
     }
 
     /// Makes room for `count` records, which commands write later.
@@ -141,8 +175,11 @@ impl Upload {
                     rows_per_image: None,
                 },
             },
-            self.texture.as_image_copy(),
-            self.texture.size(),
+            wgpu::TexelCopyTextureInfo {
+                origin: wgpu::Origin3d { x: 0, y: self.rows.start, z: 0 },
+                ..self.texture.as_image_copy()
+            },
+            wgpu::Extent3d { height: self.rows.len() as u32, ..self.texture.size() },
         );
     }
 }
