@@ -9,6 +9,11 @@ use hiz_core::{self as hiz, Bounds, CullOptions, DrawTemplate, Floats, Outputs, 
 pub(crate) const CRATES: u32 = 100_000;
 pub(crate) const SIZE: hiz::ImageSize = hiz::ImageSize { width: 1024, height: 576 };
 pub(crate) const HOUSES: std::ops::Range<u32> = CRATES..CRATES + 900;
+/// Where the eye is, and what it looks at: from above ten times as many crates show.
+pub(crate) const VIEWS: [(&str, [[f64; 3]; 2]); 2] = [
+    ("in a street", [[1.0, 15.0, 299.0], [5.0, 5.0, 260.0]]),
+    ("from above", [[0.0, 300.0, 400.0], [0.0, 0.0, 30.0]]),
+];
 
 /// Crates lie anywhere; the houses, which come last, stand in 30 rows with streets between them.
 pub(crate) fn body(i: u32) -> Body {
@@ -33,8 +38,12 @@ pub(crate) struct Town {
 }
 
 impl Town {
-    pub(crate) fn new(device: &Device, queue: &Queue) -> hiz::Result<Self> {
-        let (eye, target, up) = ([1.0, 15.0, 299.0], [5.0, 5.0, 260.0], [0.0, 1.0, 0.0]);
+    pub(crate) fn new(
+        device: &Device,
+        queue: &Queue,
+        [eye, target]: [[f64; 3]; 2],
+    ) -> hiz::Result<Self> {
+        let up = [0.0, 1.0, 0.0];
         let (fov_y, convention) = (1.0, hiz::DepthConvention::Reversed);
         let view = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
         let camera = hiz::Camera::look_at(&hiz::Pose { eye, target, up }, &view, SIZE)?;

@@ -15,7 +15,7 @@ mod own;
 
 use std::{error::Error, fs::File, sync::mpsc, time::Instant};
 
-use culling::{CRATES, SIZE, Town};
+use culling::{CRATES, SIZE, Town, VIEWS};
 use hiz_core::wgpu::{self, Buffer, BufferUsages, Device, Queue, Texture, util::DownloadBuffer};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -34,18 +34,18 @@ pub(crate) struct Row {
 pub(crate) fn main() -> Outcome<()> {
     let engine = hiz_core::headless::Engine::new(None)?; // an app has a device of its own
     let (device, queue) = (engine.device(), engine.queue());
-    let town = Town::new(device, queue)?;
-    let rows = compare(&town, device, queue, 9)?;
-    println!("way         ms per frame  crates drawn  other pixels  too far");
-    for (way, row) in WAYS.iter().zip(&rows) {
-        let other = other_pixels(&rows[0], row);
-        let holes = holes(&rows[0], row);
-        println!("{way:11} {:12.1} {:13} {other:13} {holes:8}", row.ms, row.drawn);
-    }
-    if let Some(path) = std::env::args_os().nth(1) {
-        let mut png = png::Encoder::new(File::create(path)?, SIZE.width, SIZE.height);
-        png.set_color(png::ColorType::Rgba);
-        png.write_header()?.write_image_data(&rows[1].picture)?;
+    for (name, view) in VIEWS {
+        let rows = compare(&Town::new(device, queue, view)?, device, queue, 7)?;
+        println!("{name:11} ms per frame  crates drawn  other pixels  too far");
+        for (way, row) in WAYS.iter().zip(&rows) {
+            let (other, holes) = (other_pixels(&rows[0], row), holes(&rows[0], row));
+            println!("{way:11} {:12.1} {:13} {other:13} {holes:8}", row.ms, row.drawn);
+        }
+        if let Some(path) = std::env::args_os().nth(1).filter(|_| name == VIEWS[0].0) {
+            let mut png = png::Encoder::new(File::create(path)?, SIZE.width, SIZE.height);
+            png.set_color(png::ColorType::Rgba);
+            png.write_header()?.write_image_data(&rows[1].picture)?;
+        }
     }
     Ok(())
 }

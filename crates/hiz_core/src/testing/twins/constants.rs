@@ -354,7 +354,7 @@ fn constants_fit_each_other() {
     assert_eq!(Stage::ALL.map(|s| s as usize), std::array::from_fn(|i| i));
     assert!(BLOCK_WORDS.is_power_of_two());
     // Counts within a block are packed to 16 bits.
-    assert!(32 * BLOCK_WORDS <= 1 << 16);
+    const { assert!(32 * BLOCK_WORDS <= 1 << 16) };
     // A texel for the number of a mesh's LODs, and one for each four errors.
     assert_eq!(MESH_TEXELS - 1, MAX_LODS >> number("output/mesh_table", "ERRORS_LOG2") as u32);
     // The spacing just below 2^-100 exceeds two flushed numbers.
