@@ -47,8 +47,19 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
         }
         DepthStore::Atlas => vec![wgsl!("cull/pixels_row_atlas")],
     };
-    let entry =
-        [&row[..], &[wgsl!("instances/piece"), wgsl!("cull/pixels_planes"), wgsl!("cull/pixels")]];
+    let planes = match kind {
+        BoundsKind::Box | BoundsKind::OrientedBox => wgsl!("cull/pixels_planes_box"),
+        _ => wgsl!("cull/pixels_planes_any"),
+    };
+    let own = [
+        wgsl!("instances/piece"),
+        planes,
+        wgsl!("cull/pixels_planes"),
+        wgsl!("cull/pixels_sure"),
+        wgsl!("cull/pixels_walk"),
+        wgsl!("cull/pixels"),
+    ];
+    let entry = [&row[..], &own];
     unexplained(store, kind, Decision::Seen, &entry.concat())
 }
 
