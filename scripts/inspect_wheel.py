@@ -16,6 +16,8 @@ from typing import Any
 PLATFORMS = re.compile(r"manylinux_2_28_(x86_64|aarch64)|macosx_\d+_\d+_(x86_64|arm64)|win_amd64")
 # Crates whose lack would show that the bill of materials is not that of this module.
 PARTS = ("wgpu", "wgpu-core", "naga", "pyo3", "numpy", "hiz_core", "hiz_ref")
+# How crates are named in it: those of the registry, and those of this workspace without a place.
+PLACES = ("registry+https://", "path+file:///crates/")
 # The module on Linux and macOS, and on Windows.
 MODULES = ("hizvk/_core.abi3.so", "hizvk/_core.pyd")
 EXPECTED = {
@@ -59,6 +61,9 @@ def check_sbom(sbom: dict[str, Any]) -> None:
     missing = set(PARTS) - {name for name, _ in parts}
     assert not missing, f"bill of materials: missing {sorted(missing)}"
     assert parts <= locked, f"bill of materials: {sorted(parts - locked)} not in Cargo.lock"
+    refs = [one["bom-ref"] for one in (sbom["metadata"]["component"], *sbom["components"])]
+    placed = sorted(ref for ref in refs if not ref.startswith(PLACES))
+    assert not placed, f"bill of materials: names of a build's folder: {placed}"
     silent = sorted(one["name"] for one in sbom["components"] if not one.get("licenses"))
     assert not silent, f"bill of materials: no licence of {silent}"
 

@@ -5,6 +5,7 @@
 # `setup.sh GROUP...` also installs those dependency groups of pyproject.toml (docs, wheel).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+source scripts/browser.sh
 
 # -- system packages -------------------------------------------------------------------------------
 
@@ -113,23 +114,6 @@ window_packages() {
   line="apt-get update && apt-get install -y ${missing[*]}"
   if ! have apt-get || ! can_be_root || ! (apt_install "${missing[@]}"); then
     printf 'note: the test of the window is skipped without these packages: %s\n' \
-      "sudo sh -c '$line'" >&2
-  fi
-}
-
-# What the test of a result's HTML page needs: about 120 MB are downloaded.
-# The test skips itself without it, so nothing ends here.
-browser_package() {
-  local name line
-  for name in chromium chromium-browser google-chrome; do
-    ! have "$name" || return 0
-  done
-  # What could not be installed once is not tried again.
-  [ ! -e "$STAMPS/browser" ] || return 0
-  touch "$STAMPS/browser"
-  line="apt-get update && apt-get install -y --no-install-recommends chromium"
-  if ! have apt-get || ! can_be_root || ! (apt_install chromium); then
-    printf 'note: the test of the HTML page is skipped without Chromium: %s\n' \
       "sudo sh -c '$line'" >&2
   fi
 }

@@ -1,15 +1,19 @@
 """Renews what docs/performance.md and guide.md quote of a run: `speed_docs.py [REPORT]`.
 
 REPORT is out/speed/report.md unless it is given.
+The plot is drawn from the tables as they are quoted; `speed_docs.py --plot` draws it again alone.
 Each quotation stands between two marks.
 The first mark names the report's sections, and may name which rows of their tables are wanted:
 `<!-- speed: Section; Other section | part of a label | part of another -->`.
 """
 
 import re
-import shutil
 import sys
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from tools.speed import plots
 
 DOCS = Path(__file__).parent.parent / "docs"
 DOCUMENTS = (DOCS / "performance.md", DOCS / "guide.md")
@@ -53,9 +57,25 @@ def main(report: Path) -> None:
         document.write_text(
             QUOTATION.sub(quote, document.read_text(encoding="utf-8")), encoding="utf-8"
         )
-    if (report.parent / "scale.png").exists():
-        shutil.copyfile(report.parent / "scale.png", DOCS / "images" / "scale.png")
+    plot()
+
+
+def quotation(section: str) -> str:
+    """What docs/performance.md quotes of a section."""
+    text = DOCUMENTS[0].read_text(encoding="utf-8")
+    (found,) = (mark[0] for mark in QUOTATION.finditer(text) if section in mark[2].split("; "))
+    return found
+
+
+def plot() -> None:
+    """Draws the tables by size."""
+    adapter = re.search(r"^- Adapter: (.+?) \(\w+\);", quotation("head"), re.MULTILINE)
+    assert adapter
+    plots.draw_tables(DOCS / "images" / "scale.png", quotation("Scale"), adapter[1])
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "out/speed/report.md"))
+    if sys.argv[1:] == ["--plot"]:
+        plot()
+    else:
+        main(Path(sys.argv[1] if len(sys.argv) > 1 else "out/speed/report.md"))

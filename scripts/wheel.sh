@@ -34,5 +34,6 @@ build_wheel() {
 }
 step "the sdist's Cargo.lock" smaller_lock
 step "wheel out of the sdist" build_wheel
+step "its bill of materials" "$VENV_PYTHON" scripts/stable_sbom.py dist/hizvk-*.whl
 step "the wheel in an empty virtual environment" scripts/check_wheel.sh dist/hizvk-*.whl
 ls -l dist

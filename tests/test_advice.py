@@ -603,7 +603,9 @@ def test_sparse_depth_hides_once_it_is_filled(device: hizvk.Device, make: Any, n
 def test_filling_by_loops() -> None:
     """The definition, pixel by pixel."""
     rng = np.random.default_rng(1)
-    for size, radius, share in (((1, 1), 0, 1.0), ((7, 1), 2, 0.4), ((9, 14), 3, 0.15)):
+    # The window doubles, so powers of two and their neighbours are ends of their own.
+    radii = [((12, 9), radius, 0.3) for radius in (1, 2, 4, 5, 8)]
+    for size, radius, share in [((1, 1), 0, 1.0), ((7, 1), 2, 0.4), ((9, 14), 3, 0.15), *radii]:
         depth = np.where(rng.random(size) < share, rng.uniform(1, 9, size), 0.0)
         depth[rng.random(size) < 0.05] = np.nan
         depth[rng.random(size) < 0.05] = -1.0

@@ -282,3 +282,34 @@ def test_a_camera_far_from_the_origin_loses_nothing() -> None:
     )
     assert near._inner.rows() == far._inner.rows()
     assert far._inner.origin() == [2.0**30, -(2.0**31), 0.0]
+
+
+@pytest.mark.parametrize("exponent", [-1000, -600, -70, 70, 600, 1000])
+def test_the_factor_of_a_matrix_means_nothing(device: hizvk.Device, exponent: int) -> None:
+    """Squares of such numbers leave float64, and yet every answer is that of the plain matrix."""
+    look = hizvk.Camera.look_at((1, 2, 3), (0, 0, 0), fov_y_deg=60, size=(8, 12), near=0.1)
+    flat = hizvk.Camera.orthographic(
+        (1, 2, 3), (0, 0, 0), height=4, size=(8, 12), near=0.1, far=9, reversed_z=False
+    )
+    points = hizvk.Points([(0.1, 0.2, 0.3), (-0.3, 0.1, 0.0)])
+    image = np.full((8, 12), 0.4, np.float32)
+    for plain in (look, flat):
+        one, scaled = (
+            hizvk.Camera.from_matrices(
+                factor * plain.clip_from_world, size=(8, 12), reversed_z=plain.reversed_z
+            )
+            for factor in (1.0, 2.0**exponent)
+        )
+        for expected, got in zip(
+            one.project(points.positions), scaled.project(points.positions), strict=True
+        ):
+            assert np.array_equal(expected, got, equal_nan=True)
+        discs = [hizvk.depth_from_points(points, camera, radius=0.4) for camera in (one, scaled)]
+        assert (discs[0] == discs[1]).all()
+        assert 0 < (discs[0] == discs[0].min()).mean() < 1
+        if plain is look:
+            depths = [
+                device.pyramid(image, camera, kind=camera.depth_kind).level(1, kind="distance")
+                for camera in (one, scaled)
+            ]
+            assert (depths[0] == depths[1]).all()

@@ -179,6 +179,12 @@ def test_a_hidden_group_is_explained_and_counted(
     assert told.rectangle == (4, 3, 4, 4)
     assert told.group.rectangle == (3, 3, 4, 4)
     assert "the box around its group: occluded" in str(told)
+    beside = hizvk.Spheres(centers + np.where(np.arange(65) < 64, 500.0, 0.0)[:, None], 0.05)
+    outside = device.cull(
+        device.instances(beside, order="given"), camera, pyramid, hierarchy=True
+    ).explain(7)
+    assert outside.verdict == Verdict.OUTSIDE
+    assert outside.reason.startswith("its group of 64 is outside as a whole (outside one plane")
     last = seen.explain(64)
     assert (last.verdict, last.group) == (Verdict.VISIBLE, None)
     full = device.cull(

@@ -294,7 +294,7 @@ def a_report() -> tuple[report.Report, SceneResult]:
         warm_up_ms=0.0,
         rows=[row_of(1.0, 0.0, Configuration(depth=DepthVariant(2)), 7), row_of(1.0, 0.0, None, 7)],
     )
-    found = report.Report("hizvk bench", 1, "quick", adapter)
+    found = report.Report("hizvk bench", 1, adapter, extent="quick")
     assert not found.passed
     found.scenes.append(scene)
     return found, scene

@@ -25,7 +25,8 @@ from tools.speed import figures
 if not can_draw():
     pytest.skip("matplotlib is not installed", allow_module_level=True)
 
-from hizvk.bench import plots
+from hizvk.bench import plots, texts_plot
+from hizvk.bench.texts_report import Found, Method, Report
 from tools.speed import plots as speed_plots
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -217,6 +218,29 @@ def test_overlaps_are_seen() -> None:
     other.xy, other.xyann = one.xy, one.xyann
     with pytest.raises(AssertionError):
         check(figure)
+
+
+def published(seed: int, scenes: int) -> Report:
+    """Made-up results of published tests, whose points crowd at 0 lost."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for k in range(scenes):
+        rows = []
+        for number in range(10):
+            ms = float(0.2 * rng.choice([1.0, 1.01, 1.2, 5.0]))
+            lost = 0 if number > 4 else int(rng.choice([0, 0, 3, 80]))
+            rows.append(Method(f"test {number}", number > 4, lost, 0, 0.1, Spread(ms, ms, ms)))
+        found.append(Found(f"scene {k}", "x", 20_000, 12, (9, 16), 1, 400, 400, "", rows))
+    adapter = hizvk.Adapter(0, "a", "b", "c", "vulkan", "cpu")
+    return Report("x", 1, adapter, scenes=found)
+
+
+@pytest.mark.parametrize(("seed", "scenes"), [(1, 5), pytest.param(2, 1, marks=pytest.mark.slow)])
+def test_published_tests_crowd_at_none_lost(seed: int, scenes: int) -> None:
+    figure = texts_plot.figure_of(published(seed, scenes))
+    labels = check(figure, panels=scenes)
+    shown = [name for name in labels if name.split(": ")[1].split(" ")[0].isdigit()]
+    assert len(shown) == 10 * scenes
 
 
 # -- the speed tool --------------------------------------------------------------------------------

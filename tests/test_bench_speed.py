@@ -59,6 +59,7 @@ TARGETS = {
     "cull.hidden95.differing": (0.001, False),
     "cull.hidden0.groups_over_flat": (1.1, False),
     "tiers.hidden0.1 tier, both ends": (0.5, False),
+    "tiers.above.1 tier, both ends": (0.5, False),
     "tiers.hidden95.fewer.farthest end": (100.0, True),
     "cull.many.flat": (2.0, False),
     "cull.many.groups": (2.0, False),
@@ -276,6 +277,15 @@ def test_every_round_has_every_way_once_and_begins_with_another() -> None:
     assert [one[0] for one in in_rounds[rounds.WARM :]] == ["a", "b", "c"]
     first = 3 * rounds.WARM
     assert ms["a"].tolist() == [first + 1, first + 6, first + 8]
+
+
+def test_a_part_that_judges_nothing_passes() -> None:
+    """The quick part of scale has rows alone."""
+    told = found()
+    told.instance_counts.append(figures.InstanceCount(9, 1, 1.0, 1.0, 1.0, 9, 1.0, 9))
+    assert told.passed
+    told.errors.append(figures.Error("p", "ours", 9, 3, 3, 1, 0, 2, promises=True))
+    assert not told.passed
 
 
 def test_a_broken_promise_fails_and_a_missed_target_does_not() -> None:

@@ -2,7 +2,7 @@
 
 Culls that use it hide nothing that the large images show.
 
-`crates/hiz_core/tests/conservative_depth.rs` decides exactly whether the depth is right for every
+`crates/hiz_core/tests/conservative_depth` decides exactly whether the depth is right for every
 single ray.
 Here real scenes are compared with large rasterised images, and with rays at the real geometry.
 """

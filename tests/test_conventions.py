@@ -455,15 +455,16 @@ def test_yaw_turns_from_x_to_y_where_z_is_up() -> None:
     ).rotations[0]
     c, s = np.cos(ry), np.sin(ry)
     np.testing.assert_allclose(kitti, [[c, 0, s], [0, 1, 0], [-s, 0, c]], rtol=0, atol=1e-15)
-    # Any axis, compared with the quaternion of the same turn (cos, sin * axis).
-    axis, angle = np.array([1.0, -2, 0.5]), 77.0
-    half = np.radians(angle) / 2
-    quaternion = (np.cos(half), *(np.sin(half) * axis / np.linalg.norm(axis)))
-    turned = hizvk.OrientedBoxes.from_yaw(np.zeros((1, 3)), 1.0, angle, up=axis).rotations[0]
-    for k in range(3):
-        np.testing.assert_allclose(
-            turned[:, k], turned_by(quaternion, np.eye(3)[k]), rtol=0, atol=1e-14
-        )
+    # Any axis and angle, compared with the quaternion of the same turn (cos, sin * axis).
+    axis, angles = np.array([1.0, -2, 0.5]), np.arange(-400.0, 400.0, 13.0)
+    turns = hizvk.OrientedBoxes.from_yaw(np.zeros((len(angles), 3)), 1.0, angles, up=axis).rotations
+    for turned, angle in zip(turns, angles, strict=True):
+        half = np.radians(angle) / 2
+        quaternion = (np.cos(half), *(np.sin(half) * axis / np.linalg.norm(axis)))
+        for k in range(3):
+            np.testing.assert_allclose(
+                turned[:, k], turned_by(quaternion, np.eye(3)[k]), rtol=0, atol=1e-14
+            )
 
 
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])

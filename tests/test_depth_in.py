@@ -149,6 +149,31 @@ def test_arrays_end_as_a_pyramid_of_the_whole_image(
         assert same_levels(hiz, levels_of(image, reversed_z=reversed_z)), size
 
 
+@pytest.mark.parametrize("reversed_z", [True, False])
+def test_both_ends_of_samples_follow_an_update(device: hizvk.Device, reversed_z: bool) -> None:
+    """By the definition: the farthest and the nearest of all samples that a texel covers."""
+    rng = np.random.default_rng(12)
+    kind: Any = "reversed_ndc" if reversed_z else "ndc"
+    far, near = (0.0, 1.0) if reversed_z else (1.0, 0.0)
+    ends = [np.fmin, np.fmax] if reversed_z else [np.fmax, np.fmin]
+    size = (17, 22)
+    image = ndc_samples(rng, size, 4).astype(np.float32)
+    hiz = device.pyramid(image, camera(size, reversed_z=reversed_z), kind=kind, depths="both")
+    for row, column, height, width in [(0, 0, 17, 22), (3, 5, 6, 9), (16, 21, 1, 1), (8, 0, 2, 22)]:
+        part = ndc_samples(rng, (height, width), 4).astype(np.float32)
+        image[row : row + height, column : column + width] = part
+        hiz.update(row, column, part)
+        with np.errstate(invalid="ignore"):
+            is_depth = (image >= 0) & (image <= 1)
+        for end, reduce, without in zip(("farthest", "nearest"), ends, (far, near), strict=True):
+            pixels = reduce.reduce(np.where(is_depth, image, np.float32(without)), axis=2)
+            pixels[np.abs(pixels) < np.finfo(np.float32).tiny] = 0.0
+            for k in range(hiz.num_levels):
+                rows = reduce.reduceat(pixels, np.arange(0, size[0], 1 << k), axis=0)
+                texels = reduce.reduceat(rows, np.arange(0, size[1], 1 << k), axis=1)
+                assert np.array_equal(hiz.level(k, end=end), texels), (end, k, row)
+
+
 @pytest.mark.parametrize("kind", ["z", "distance"])
 @pytest.mark.parametrize("dtype", ["float32", "float64", "float16", "uint16"])
 def test_metric_arrays_are_converted_at_their_place(

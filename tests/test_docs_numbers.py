@@ -21,7 +21,7 @@ import documented
 import hizvk
 from documented import page
 from hizvk.bench import command, footprints, texts, texts_report
-from tools.speed import bounds, figures
+from tools.speed import bounds, figures, plots
 from tools.speed.run import WORKLOADS, Run
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -42,6 +42,33 @@ def script(name: str) -> Any:
 
 
 guide_docs = script("guide_docs")
+
+
+def test_the_plot_by_size_is_of_the_table_above_it() -> None:
+    """If this is red, run ``scripts/speed_docs.py --plot``."""
+    docs = script("speed_docs")
+    file = (ROOT / "docs" / "images" / "scale.png").read_bytes()
+    text = docs.quotation("Scale")
+    assert b"Source\0" + plots.mark_of(text).encode() in file
+    found = plots.found_in(text, "x")
+    assert [row.instances for row in found.instance_counts[:2]] == [1_000, 10_000]
+    (row,) = (row for row in found.instance_counts if row.instances == 10_000_000)
+    cells = documented.table(page("performance.md"), "instances", "pieces")[6]
+    assert cells["instances"] == "10,000,000"
+    assert (row.upload_ms, row.flat_ms) == (float(cells["upload"]), float(cells["flat"]))
+    assert row.tests == round(1e7 * float(cells["tests"]))
+    assert row.device_bytes == round(1e7 * float(cells["bytes"]))
+    cells = documented.table(page("performance.md"), "pixels", "memcpy")[0]
+    assert cells["pixels"] == "256x256"
+    image = found.image_sizes[0]
+    assert (image.side, image.reduce_ms) == (256, float(cells["all levels"]))
+    assert image.groups_ms == float(cells["cull, groups"])
+    assert image.texels == float(cells["texels per instance, flat"])
+    # A number of another run has another mark.
+    digit = text.index("| 1,000 |") + len("| 1,000 | 1 | 0.")
+    assert text[digit].isdigit()
+    other = f"{text[:digit]}{(int(text[digit]) + 1) % 10}{text[digit + 1 :]}"
+    assert plots.mark_of(other) != plots.mark_of(text)
 
 
 def test_the_guide_quotes_the_bench() -> None:

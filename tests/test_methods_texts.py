@@ -315,7 +315,7 @@ def test_a_lost_instance_fails_the_bench(device: hizvk.Device) -> None:
     def report_of(promises: bool, lost: int) -> Report:
         row = Method("a row", promises, lost, 0, 0.5, Spread(1.0, 1.0, 1.0))
         scene = Found("gates", "gates", 9, 1, (4, 4), 1, 8, 1, "by hand", [row])
-        return Report("command", 1, device.adapter, [scene])
+        return Report("command", 1, device.adapter, scenes=[scene])
 
     assert report_of(promises=True, lost=0).passed
     assert report_of(promises=False, lost=2).passed

@@ -184,3 +184,35 @@ def test_wgsl_has_the_functions() -> None:
     # Sizes are arguments: a level's size must not be asked for per invocation.
     code = "\n".join(line.split("//")[0] for line in lookup.splitlines())
     assert "textureDimensions" not in code
+
+
+def test_the_nearest_depths_of_what_lost_its_no_data_are_refused(device: hizvk.Device) -> None:
+    """A pyramid of the farthest depths alone: its conversion has made "no data" far."""
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(8, 8), near=0.1)
+    image = np.full((8, 8), 10.0)
+    whole = device.pyramid(image, camera, kind="z")
+    assert (whole.mips(depths="nearest")[3] > 0).all(), "nothing was lost"
+    image[3, 3] = 0
+    holed = device.pyramid(image, camera, kind="z")
+    for depths in ("nearest", "both"):
+        with pytest.raises(ValueError, match="build the pyramid with depths both"):
+            holed.mips(depths=depths)  # type: ignore[arg-type]
+    assert holed.mips()[3][0, 0] == 0.0, "far"
+    both = device.pyramid(image, camera, kind="z", depths="both")
+    assert both.mips(depths="nearest")[3][0, 0] == 1.0, "near"
+    # An update may lose it, too.
+    whole.update(0, 0, np.zeros((1, 1)))
+    with pytest.raises(ValueError, match="build the pyramid with depths both"):
+        whole.mips(depths="nearest")
+
+
+def test_mips_of_several_samples(device: hizvk.Device) -> None:
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(8, 8), near=0.1)
+    image = np.random.default_rng(4).uniform(0.1, 0.9, (8, 8, 4)).astype(np.float32)
+    both = device.pyramid(image, camera, kind="reversed_ndc", depths="both")
+    assert both.mips(depths="nearest")[3][0, 0] == image.max()
+    assert both.mips(depths="farthest")[3][0, 0] == image.min()
+    farthest = device.pyramid(image, camera, kind="reversed_ndc")
+    assert farthest.mips()[3][0, 0] == image.min()
+    with pytest.raises(ValueError, match="farthest of 4 samples"):
+        farthest.mips(depths="nearest")

@@ -184,3 +184,22 @@ def test_closed_doors_fill_their_doorways() -> None:
                 assert np.allclose(high, (x + 1.0, near + 0.0625, 2.25))
                 shut += 1
         assert 0.4 * 6 * FRAMES < shut < 0.6 * 6 * FRAMES
+
+
+@pytest.mark.parametrize("rasteriser", ["host", "device"])
+def test_no_pixel_changes_outside_of_the_rectangle(device: hizvk.Device, rasteriser: Any) -> None:
+    """Squares that end at borders of pixels, at their centres, and at those of the image."""
+    camera = hizvk.Camera.orthographic(
+        (0, 0, 0), (0, 0, -1), height=16, size=(16, 16), near=0, far=10
+    )
+    for low, high in [(3.0, 8.0), (3.5, 7.5), (0.0, 16.0), (-2.0, 18.0), (12.0, 16.0), (0.0, 1.0)]:
+        x, y = np.array([low, high, high, low]) - 8.0, np.array([low, low, high, high]) - 8.0
+        corners = np.stack([x, y, np.full(4, -5.0)], axis=1)
+        square = device.occluders(corners, [[0, 1, 2], [0, 2, 3]])
+        depth = device.render_depth(square, camera, rasteriser=rasteriser, only=[])
+        assert not depth.numpy().any()
+        touched = device.render_depth(square, into=depth)
+        rows, columns = np.nonzero(depth.numpy())
+        assert touched is not None
+        assert touched[0] <= columns.min() <= columns.max() <= touched[2] < 16, (low, high)
+        assert touched[1] <= rows.min() <= rows.max() <= touched[3] < 16, (low, high)

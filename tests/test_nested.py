@@ -120,6 +120,22 @@ def test_updates_absent_and_among(
             assert np.array_equal(some.mask, (of == FRONT) & ~absent & asked)
 
 
+def test_a_part_that_is_updated_reaches_the_third_tier(
+    device: hizvk.Device, camera: hizvk.Camera, pyramids: dict[str, hizvk.Pyramid]
+) -> None:
+    """Its box is made of the boxes of the second tier, of which the last one has changed."""
+    count = GROUP**3 + GROUP
+    of = np.full(count, BEHIND)
+    crowd = device.instances(hizvk.Points(spheres(of).centers.astype(np.float32)), order="given")
+    for index in (3, 200_000, GROUP**3 - 1, count - 1):
+        of[index] = FRONT
+        moved = hizvk.Points(spheres(of).centers[index : index + 1].astype(np.float32))
+        crowd.update(index, moved)
+        seen = device.cull(crowd, camera, pyramids["farthest"], hierarchy=3)
+        assert seen.stats.tested_boxes[2] == 2
+        assert np.flatnonzero(seen.mask).tolist() == np.flatnonzero(of == FRONT).tolist()
+
+
 def test_invalid_members_are_kept_and_counted(
     device: hizvk.Device, camera: hizvk.Camera, pyramids: dict[str, hizvk.Pyramid]
 ) -> None:

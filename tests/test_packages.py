@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import ctypes
+import hashlib
 import importlib.util
 import json
 import os
@@ -34,6 +36,7 @@ def script(name: str) -> Any:
 
 
 inspect_wheel, same_lock = script("inspect_wheel"), script("same_lock")
+stable_sbom = script("stable_sbom")
 
 
 # -- extras ----------------------------------------------------------------------------------------
@@ -99,11 +102,17 @@ def test_without_metadata_the_packages_are_named(monkeypatch: pytest.MonkeyPatch
 def sbom(**changes: Any) -> dict[str, Any]:
     one = {
         "name": "wgpu",
+        "bom-ref": "registry+https://github.com/rust-lang/crates.io-index#wgpu",
         "version": locked("wgpu"),
         "licenses": [{"expression": "MIT OR Apache-2.0"}],
     }
     parts = [{**one, "name": name, "version": locked(name)} for name in inspect_wheel.PARTS]
-    return {"bomFormat": "CycloneDX", "specVersion": "1.5", "components": parts} | changes
+    return {
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.5",
+        "metadata": {"component": {"bom-ref": "path+file:///crates/hiz_py#0.1.0"}},
+        "components": parts,
+    } | changes
 
 
 LOCK = tomllib.loads((ROOT / "Cargo.lock").read_text(encoding="utf-8"))["package"]
@@ -121,11 +130,67 @@ def test_a_bill_of_materials_names_locked_crates_with_licences() -> None:
         "not in Cargo.lock": sbom(
             components=[{**each, "version": "0.0.1"} for each in sbom()["components"]]
         ),
+        "a build's folder": sbom(
+            metadata={"component": {"bom-ref": "path+file:///tmp/t/crates/hiz_py#0.1.0"}}
+        ),
         "no licence": sbom(components=[{**each, "licenses": []} for each in sbom()["components"]]),
     }
     for why, planted in bad.items():
         with pytest.raises(AssertionError, match=why):
             inspect_wheel.check_sbom(planted)
+
+
+@pytest.mark.parametrize(
+    "folder", ["/tmp/tmp.iKR0TP2vAh/hizvk-0.1.0", "/D:/a/hizvk/hizvk", "/home/crates/my%20own"]
+)
+def test_a_bill_of_materials_does_not_tell_where_it_was_built(tmp_path: Path, folder: str) -> None:
+    names = ["hiz_core", "hiz_py"]
+    refs = [f"path+file://{folder}/crates/{name}#0.1.0" for name in names]
+    bill = {
+        "metadata": {"component": {"bom-ref": refs[1]}},
+        "components": [{"bom-ref": refs[0]}, {"bom-ref": "registry+https://x#wgpu@30.0.1"}],
+        "dependencies": [{"ref": refs[1], "dependsOn": [refs[0]]}],
+    }
+    path = tmp_path / "hizvk-0.1.0-cp311-abi3-win_amd64.whl"
+    info = "hizvk-0.1.0.dist-info"
+    others = {"hizvk/__init__.py": b"x = 1\n", f"{info}/WHEEL": b"Tag: cp311-abi3-win_amd64\n"}
+    at = f"{info}/sboms/hiz_py.cyclonedx.json"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as wheel:
+        for name, content in others.items():
+            wheel.writestr(name, content)
+        wheel.writestr(at, json.dumps(bill))
+        wheel.writestr(f"{info}/RECORD", f"hizvk/__init__.py,sha256=a,6\n{at},sha256=b,9\n")
+    stable_sbom.main(str(path))
+    stable_sbom.main(str(path))  # once more changes nothing
+    with zipfile.ZipFile(path) as wheel:
+        assert wheel.testzip() is None
+        assert wheel.namelist() == [*others, at, f"{info}/RECORD"]
+        for name, content in others.items():
+            assert wheel.read(name) == content
+        written = wheel.read(at)
+        record = wheel.read(f"{info}/RECORD").decode().splitlines()
+    found = json.loads(written)
+    core, py = (f"path+file:///crates/{name}#0.1.0" for name in names)
+    assert found["metadata"]["component"]["bom-ref"] == py
+    assert found["components"][0]["bom-ref"] == core
+    assert found["dependencies"] == [{"ref": py, "dependsOn": [core]}]
+    digest = base64.urlsafe_b64encode(hashlib.sha256(written).digest()).decode().rstrip("=")
+    assert record == ["hizvk/__init__.py,sha256=a,6", f"{at},sha256={digest},{len(written)}"]
+
+
+def test_actions_are_named_by_hash() -> None:
+    """A tag can be moved to another commit; the version is for people."""
+    found: dict[str, set[str]] = {}
+    for path in sorted((ROOT / ".github" / "workflows").glob("*.yml")):
+        for line in path.read_text(encoding="utf-8").splitlines():
+            name, is_one, rest = line.partition("uses: ")
+            if not is_one or name.strip() not in ("", "-"):
+                continue
+            pinned = re.fullmatch(r"([\w-]+/[\w-]+)@([0-9a-f]{40} # v\d+\.\d+\.\d+)", rest)
+            assert pinned, f"{path.name}: expected NAME@HASH # vX.Y.Z, got {rest}"
+            found.setdefault(pinned[1], set()).add(pinned[2])
+    assert len(found) >= 4
+    assert all(len(versions) == 1 for versions in found.values()), found
 
 
 def test_a_wheel_without_a_bill_of_materials_is_refused(tmp_path: Path) -> None:

@@ -206,3 +206,39 @@ def test_what_was_not_asked_for_is_refused(device: hizvk.Device) -> None:
         )
         == 0
     )
+
+
+@pytest.mark.parametrize("reversed_z", [False, True])
+def test_one_looks_through_where_all_samples_are_behind(
+    device: hizvk.Device, reversed_z: bool
+) -> None:
+    """Several samples per pixel: open if the nearest is behind, hidden if the farthest is before.
+
+    The box faces the camera, from view depth 4 to 4.01, so each pixel compares with these two.
+    """
+    camera = hizvk.Camera.look_at(
+        (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(32, 32), near=0.1, reversed_z=reversed_z
+    )
+    rng = np.random.default_rng(6)
+    image = rng.choice([2.0, 4.005, 9.0, np.inf], (32, 32, 4), p=[0.1, 0.1, 0.6, 0.2])
+    image[:16] = np.where(rng.random((16, 32, 1)) < 0.3, 2.0, 9.0)
+    box = device.instances(hizvk.Boxes([(-3, -3, -4.01)], [(3, 3, -4)]))
+    pyramids = {
+        depths: device.pyramid(image, camera, kind="z", depths=depths)
+        for depths in ("farthest", "both")
+    }
+    counts = {
+        depths: device.cull(box, camera, pyramid, outputs=["pixels"]).pixels[0]
+        for depths, pyramid in pyramids.items()
+    }
+    # The box's front spans pixels 4 to 27, and a rectangle may have one more on each side.
+    inner, outer = image[4:28, 4:28], image[3:29, 3:29]
+    both, one = counts["both"], counts["farthest"]
+    # At the box's outline only its front is in a pixel.
+    is_behind, may_be_behind = (inner > 4.01).all(axis=-1), (outer > 4).all(axis=-1)
+    assert 0 < is_behind.sum() <= both["open"] <= may_be_behind.sum() < 676
+    hides = [(part < 4).all(axis=-1).sum() for part in (inner, outer)]
+    assert 0 < hides[0] <= both["hidden"] <= hides[1]
+    assert both["hidden"] == one["hidden"]
+    assert both["touched"] == one["touched"]
+    assert one["open"] == 0, "a nearer sample may be before the box"

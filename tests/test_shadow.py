@@ -5,6 +5,7 @@ Depth, shadow maps and lookups come from the loops of this file, which cast rays
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +13,12 @@ import numpy as np
 import pytest
 
 import hizvk
+from hizvk import cli
 from hizvk.bench import shadows as bench
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import numpy.typing as npt
 
     Floats = npt.NDArray[np.float64]
@@ -417,6 +421,27 @@ def test_an_invalid_pixel_keeps_every_caster_of_a_mask(device: hizvk.Device) -> 
     assert (device.receiver_mask(depth, camera, light, kind="reversed_ndc").numpy() == 0).all()
     empty = np.zeros(SIZE, np.float32)
     assert (device.receiver_mask(empty, camera, light, kind="reversed_ndc").numpy() == 1).all()
+
+
+def test_the_bench_reports_what_is_lost(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``hizvk bench --shadows``: its report, and its exit code."""
+    asked = []
+
+    def measured(size: tuple[int, int], *, small: int, descent: int) -> list[bench.Row]:
+        asked.append((size, small, descent))
+        return [bench.Row("street", 1600, 7, 900, 30, 9, lost, 1.25)]
+
+    monkeypatch.setattr(bench, "measure", measured)
+    for lost in (0, 1):
+        given = ["--shadows", "--out", str(tmp_path), "--size", "80x45", "--small", "300"]
+        assert cli.main(["bench", *given]) == lost
+        page = capsys.readouterr().out
+        assert f"| street | 1,600 | 7 | 900 | 30 | 9 | {lost} | 1.2 |" in page
+        assert (tmp_path / "report.md").read_text(encoding="utf-8").strip() == page.strip()
+        assert json.loads((tmp_path / "report.json").read_text())["rows"][0]["lost"] == lost
+    assert asked == [((45, 80), 300, 0)] * 2
 
 
 def test_the_bench_loses_no_shadow() -> None:

@@ -8,7 +8,8 @@ import os
 import re
 import shutil
 import subprocess
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +23,6 @@ from hizvk.show.seen import Seen
 from hizvk.show.web import MOST_TRIANGLES, page_of
 from pictures import decoded, near
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 WHITE, RED, BLUE = map(rgb, CLASS_COLOURS)
 SIZE = (90, 160)
 #: Against a browser that hangs; one picture takes two seconds.
@@ -32,6 +30,9 @@ GUARD_S = 120
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 #: Of the browser's window; the canvas has what the panel of 350 pixels leaves.
 WINDOW, CANVAS = (1150, 600), 800
+ROOT = Path(__file__).resolve().parents[1]
+#: Tests put another in its place.
+shutil_which = shutil.which
 
 
 def camera() -> hizvk.Camera:
@@ -194,16 +195,42 @@ def test_a_cull_that_tells_nothing_is_refused(device: hizvk.Device, tmp_path: Pa
 # -- in a browser ----------------------------------------------------------------------------------
 
 
+def usable_browser(guard_s: float = 20.0) -> tuple[str | None, str]:
+    """A browser's path, or why there is none.
+
+    On Ubuntu a command may be a stub that asks for a snap, and a snap sees another /tmp.
+    """
+    why = []
+    for name in BROWSERS:
+        path = shutil.which(name)
+        if path is None:
+            continue
+        if "/snap/" in os.path.realpath(path) or os.path.realpath(path).endswith("/snap"):
+            why.append(f"{path} is a snap, which does not see the files of tests")
+            continue
+        try:
+            told = subprocess.run(
+                [path, "--version"], capture_output=True, text=True, timeout=guard_s, check=False
+            )
+        except (OSError, subprocess.TimeoutExpired):
+            why.append(f"{path} does not say its version")
+            continue
+        if told.returncode == 0 and re.search(r"\d+\.\d", told.stdout):
+            return path, ""
+        why.append(f"{path} is no browser: {(told.stdout + told.stderr).strip()[:200]}")
+    reason = "; ".join(why) or (
+        "install it with: apt-get update && apt-get install -y --no-install-recommends chromium"
+    )
+    return None, f"no Chromium; {reason}"
+
+
 class Browser:
     """Headless Chromium without a network; pages are opened side by side."""
 
-    def __init__(self, folder: Path) -> None:
-        self._path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    def __init__(self, folder: Path, guard_s: float = 20.0) -> None:
+        self._path, why = usable_browser(guard_s)
         if self._path is None:
-            pytest.skip(
-                "no Chromium; install it with: "
-                "apt-get update && apt-get install -y --no-install-recommends chromium"
-            )
+            pytest.skip(why)
         self._folder = folder
         self._opened = 0
 
@@ -243,6 +270,104 @@ class Browser:
             assert one.returncode == 0, told
             assert "CONSOLE" not in told, told
         return [decoded(file.read_bytes()) for file in files]
+
+
+@pytest.mark.parametrize(
+    ("script", "reason"),
+    [
+        (
+            "echo \"Command 'chromium' requires the chromium snap to be installed.\" >&2; exit 1",
+            "chromium is no browser: Command 'chromium' requires the chromium snap",
+        ),
+        ("exec sleep 60", "chromium does not say its version"),
+        ("exit 0", "chromium is no browser"),
+        (None, "apt-get install -y --no-install-recommends chromium"),
+    ],
+)
+def test_a_stub_is_no_browser(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str | None, reason: str
+) -> None:
+    if script is not None:
+        stub = tmp_path / "chromium"
+        stub.write_text(f"#!/bin/sh\n{script}\n")
+        stub.chmod(0o755)
+    # The stub alone is found; `sleep` is where it always is.
+    monkeypatch.setattr(shutil, "which", lambda name: shutil_which(name, path=str(tmp_path)))
+    path, why = usable_browser(0.5)
+    assert path is None
+    assert why.startswith("no Chromium; ")
+    assert reason in why
+    with pytest.raises(pytest.skip.Exception, match="no Chromium"):
+        Browser(tmp_path, 0.5)
+
+
+def test_a_snap_is_no_browser_and_others_are_asked(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "snap" / "bin").mkdir(parents=True)
+    for place in ("snap/bin/chromium", "google-chrome"):
+        stub = tmp_path / place
+        stub.write_text("#!/bin/sh\necho Chromium 120.0.1\n")
+        stub.chmod(0o755)
+    (tmp_path / "chromium").symlink_to(tmp_path / "snap" / "bin" / "chromium")
+    monkeypatch.setattr(shutil, "which", lambda name: shutil_which(name, path=str(tmp_path)))
+    assert usable_browser() == (str(tmp_path / "google-chrome"), "")
+    (tmp_path / "google-chrome").unlink()
+    assert "chromium is a snap" in usable_browser()[1]
+
+
+#: `make setup` on an Ubuntu: what the package list says, which command there is, what is installed.
+SETUP = """
+set -euo pipefail
+have() {{ command -v "$1" >/dev/null 2>&1; }}
+can_be_root() {{ return 0; }}
+apt_install() {{ echo "installing $*"; printf '#!/bin/sh\n{installed}\n' >{folder}/chromium;
+  chmod +x {folder}/chromium; }}
+STAMPS={folder}/stamps BROWSER_GUARD_S=1
+. {source}
+browser_package
+echo done
+"""
+
+
+@pytest.mark.parametrize(
+    ("package", "stub", "installed", "installs", "noted"),
+    [
+        ("Description: web browser", None, "echo Chromium 120.0", True, False),
+        ("Description: web browser", "sleep 60", "echo Chromium 120.0", True, False),
+        ("Description: web browser", None, "exit 1", True, True),
+        ("Description: Transitional package - chromium snap", "exit 1", "exit 1", False, True),
+        ("Description: web browser", "echo Chromium 120.0", "exit 1", False, False),
+    ],
+)
+def test_setup_neither_hangs_nor_fails_on_a_stub(
+    tmp_path: Path, package: str, stub: str | None, installed: str, installs: bool, noted: bool
+) -> None:
+    (tmp_path / "stamps").mkdir()
+    scripts = {"apt-get": "exit 0", "apt-cache": f"echo '{package}'"}
+    for name, script in {**scripts, **({"chromium": stub} if stub else {})}.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{script}\n")
+        (tmp_path / name).chmod(0o755)
+    for name in ("timeout", "grep", "touch", "chmod", "sleep"):
+        found = shutil.which(name)
+        assert found
+        (tmp_path / name).symlink_to(found)
+    source = ROOT / "scripts" / "browser.sh"
+    text = SETUP.format(folder=tmp_path, source=source, installed=installed)
+    for turn in range(2):  # what could not be installed is not tried again
+        told = subprocess.run(
+            ["/bin/bash", "-c", text],
+            env={"PATH": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            timeout=GUARD_S,
+            check=False,
+        )
+        assert told.returncode == 0, told.stderr
+        assert told.stdout.endswith("done\n")
+        assert ("installing chromium" in told.stdout) == (installs and turn == 0)
+        is_noted = "the test of the HTML page is skipped without Chromium" in told.stderr
+        assert is_noted == (noted and turn == 0)
 
 
 @pytest.fixture(scope="module")

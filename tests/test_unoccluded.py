@@ -219,3 +219,26 @@ def test_rays_of_the_castle_meet_nothing_before_it(
     assert all_ > 20
     assert flat > 0.3 * all_
     assert walked > 0.85 * all_
+
+
+@pytest.mark.parametrize("reversed_z", [False, True])
+def test_a_mask_alone_is_that_of_the_verdicts(device: hizvk.Device, reversed_z: bool) -> None:
+    """Without verdicts no nearest depth of an instance is read, and the same is kept."""
+    rng = np.random.default_rng(7)
+    camera = look((60, 80), reversed_z=reversed_z)
+    image = rng.choice([4.0, 9.0, np.inf], camera.size, p=[0.5, 0.4, 0.1])
+    image[20:50, :60] = 4.0
+    pyramid = device.pyramid(image, camera, kind="z", depths="both")
+    centers = rng.uniform([-6, -4, -14], [6, 4, -1], (6000, 3))
+    crowd = device.instances(hizvk.Spheres(centers, rng.uniform(0.01, 0.3, 6000)))
+    for options in ({}, {"descent": 64}, {"fit": "volume"}, {"coverage": "sample"}):
+        for hierarchy in (0, 1, 2):
+            given: dict[str, Any] = {"hierarchy": hierarchy, **options}
+            told = device.cull(crowd, camera, pyramid, **given)
+            masks = [
+                device.cull(crowd, camera, pyramid, outputs=outputs, **given).mask
+                for outputs in (["mask"], ["mask", "indices", "draws"])
+            ]
+            assert all(np.array_equal(mask, told.mask) for mask in masks), given
+            assert 100 < told.mask.sum() < 5900
+            assert (told.verdicts == Verdict.UNOCCLUDED).sum() > 100

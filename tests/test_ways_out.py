@@ -183,3 +183,56 @@ def test_fractions_of_objects_that_the_image_does_not_hold(device: hizvk.Device)
         assert seen.visible_fraction(objects_in_depth=False) == [1.0]
         hidden = device.instances(hizvk.Spheres([(0.0, 0.0, -20.0)], 0.5))
         assert culled(device, instances=hidden, outputs=["pixels"]).visible_fraction() == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("eye", "hint"),
+    [
+        (np.zeros((5, 3)), True),
+        ([(0.0, 1.0, 2.0), (3.0, 4.0, 5.0)], True),
+        ((0.0, 1.0), False),
+        (np.zeros((3, 4)), False),
+    ],
+)
+def test_a_cube_is_around_one_eye(eye: Any, hint: bool) -> None:
+    with pytest.raises(ValueError, match=r"^eye: expected \(3,\) finite numbers, got") as caught:
+        hizvk.cube(eye, size=8, near=0.1)
+    way = "[camera for one in eye for camera in hizvk.cube(one, ...)]"
+    assert (way in str(caught.value)) == hint
+    if hint:
+        call = way.replace("...", "size=8, near=0.1")
+        assert len(eval(call, {"eye": eye, "hizvk": hizvk})) == 6 * len(eye)
+    with pytest.raises(
+        TypeError, match=r"^size: .*pixels per side of a square, got tuple \(8, 8\)"
+    ):
+        hizvk.cube((0, 0, 0), size=(8, 8), near=0.1)  # type: ignore[arg-type]
+
+
+def test_a_number_past_the_end_says_what_may_be_meant(device: hizvk.Device) -> None:
+    seen = culled(device, instances=device.instances(hizvk.Spheres(np.zeros((5, 3)), 1.0)))
+    hiz = device.pyramid(DEPTH, CAMERA, kind="z")  # 6 x 8 pixels: levels 0 to 3
+    sweep = hizvk.sweep(BALLS, [CAMERA] * 2, depths=[DEPTH] * 2, kind="z")
+    views = device.cull(device.instances(BALLS), [CAMERA] * 2, [hiz] * 2)
+    calls: list[tuple[Callable[[int], object], str, int]] = [
+        (seen.explain, "index: expected an integer", 5),
+        (hiz.level, "k: expected a level", 4),
+        (sweep.mask, "view: expected an integer", 2),
+    ]
+    for call, expected, count in calls:
+        for number, hint in (
+            (count, "; the first one is 0"),
+            (-1, f"; counted from the end that is {count - 1}"),
+            (-count, "; counted from the end that is 0"),
+            (count + 1, ""),
+            (-count - 1, ""),
+        ):
+            with pytest.raises(IndexError) as caught:
+                call(number)
+            assert str(caught.value) == f"{expected} in 0..{count - 1}, got {number}{hint}"
+    with pytest.raises(
+        IndexError, match=r"^view: expected .* in -2\.\.1, got 2; the first one is 0$"
+    ):
+        views[2]
+    nothing = culled(device, instances=device.instances(hizvk.Spheres([], [])))
+    with pytest.raises(IndexError, match=r"nothing, for there are no instances, got 0$"):
+        nothing.explain(0)

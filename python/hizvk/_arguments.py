@@ -450,6 +450,24 @@ def integer(name: str, value: object, *, low: int, high: int) -> int:
     return result
 
 
+def index(name: str, value: object, count: int, *, what: str = "an integer", none: str) -> int:
+    """One of ``0..count - 1``; an `IndexError` says what the number may have been meant to be.
+
+    `none` says why there is nothing where `count` is 0.
+    """
+    try:
+        return integer(name, value, low=0, high=count - 1)
+    except ValueError:
+        number = operator.index(value)  # type: ignore[arg-type]
+        expected = f"{what} in 0..{count - 1}" if count else f"nothing, for {none}"
+        hint = ""
+        if -count <= number < 0:
+            hint = f"; counted from the end that is {count + number}"
+        elif number == count and count:
+            hint = "; the first one is 0"
+        raise IndexError(f"{name}: expected {expected}, got {number}{hint}") from None
+
+
 def size(name: str, value: object) -> Size:
     """An image size ``(height, width)`` of at least one pixel."""
     expected = f"(height, width), two integers in 1..{LARGEST_SIDE}"

@@ -25,6 +25,10 @@ Pose = tuple[str, "npt.NDArray[np.float64]"]
 
 #: The length of OpenCV's longest list of distortion coefficients.
 MOST_COEFFICIENTS = 14
+#: Angles of view are usually multiples of so many degrees,
+ROUND_DEG: Final = 5
+#: and 1.0472, which is 60 degrees in radians with four digits, is off by half of this.
+ANGLE_ROOM: Final = 3e-4
 
 #: What is added to cx and cy, so that the first pixel's centre comes to (0.5, 0.5).
 TO_HALF: Final = {"integer": 0.5, "half": 0.0}
@@ -149,6 +153,25 @@ def intrinsics(k: object) -> npt.NDArray[np.float64]:
         hint = "; it looks transposed" if result[:, 2].tolist() == [0.0, 0.0, 1.0] else ""
         raise ValueError(f"{expected}, got {result.tolist()}{hint}")
     return result
+
+
+def field_of_view(name: str, value: object, *, stacklevel: int = 3) -> float:
+    """An angle of view in degrees; warns of one that is a usual angle in radians.
+
+    Nobody asks for 1.0472 degrees, which is 60 degrees in radians.
+    `stacklevel` is that of the caller, from here.
+    """
+    angle = _arguments.number(name, value, above=0.0, below=180.0)
+    meant = math.degrees(angle)
+    usual = ROUND_DEG * round(meant / ROUND_DEG)
+    if 0.0 < usual < 180.0 and abs(meant - usual) < ANGLE_ROOM:
+        warnings.warn(
+            f"{name}: {angle:.6g} degrees are as narrow as a telescope's view, and {angle:.6g} "
+            f"radians are {usual} degrees; if that is meant, pass {usual}",
+            HizWarning,
+            stacklevel=stacklevel,
+        )
+    return angle
 
 
 def hint_at_size(k: npt.NDArray[np.float64], size: Size) -> None:

@@ -116,6 +116,7 @@ def reference_classify(
     invalid: Sequence[float],
     coverage: str,
     own_depth: str,
+    tolerance: tuple[float, float],
 ) -> npt.NDArray[np.uint8]: ...
 def reference_unoccluded(
     bounds_kind: str,
@@ -309,10 +310,11 @@ class Engine:
         instances: Instances,
         camera: Camera,
         occluders: Occluders | None,
-        levels: tuple[int, int],
+        stored: tuple[tuple[int, int], str],
         options: CullOptions,
         outputs: Outputs,
         meshes: MeshTable | None,
+        more: tuple[bool, int, int],
     ) -> None: ...
     def cull_once(
         self,
@@ -565,6 +567,7 @@ class Yardstick:
     @staticmethod
     def profile() -> str: ...
     def empty_submit_ms(self) -> float: ...
+    def pipelines_made(self) -> int: ...
     @staticmethod
     def memcpy_ms(source: npt.NDArray[np.float32], target: npt.NDArray[np.float32]) -> float: ...
     def reduction(

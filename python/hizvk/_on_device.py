@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Generic, NoReturn, Protocol, TypeVar
 
+from . import _arguments
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ._core import Engine as CoreEngine
     from .adapter import Adapter
 
-__all__ = ["Allocated", "Maker", "OnDevice", "StaysInProcess", "check_owner"]
+__all__ = ["Allocated", "Maker", "OnDevice", "StaysInProcess", "check_owner", "owned"]
 
 
 class Maker(Protocol):
@@ -43,6 +45,7 @@ class _HasBytes(Protocol):
 
 
 _Inner = TypeVar("_Inner")
+_Thing = TypeVar("_Thing", bound="OnDevice[Any]")
 _InnerWithBytes = TypeVar("_InnerWithBytes", bound=_HasBytes)
 
 
@@ -91,3 +94,12 @@ def check_owner(name: str, thing: OnDevice[Any], device: object) -> None:
         raise ValueError(
             f"{name}: expected {type(thing).__name__} of this device, got one of another Device"
         )
+
+
+def owned(
+    name: str, thing: object, wanted: type[_Thing], expected: str, hint: str = "", *, device: object
+) -> _Thing:
+    """An object of this class that `device` has made; see `_arguments.instance`."""
+    found = _arguments.instance(name, thing, wanted, expected, hint)
+    check_owner(name, found, device)
+    return found

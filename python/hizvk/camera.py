@@ -138,7 +138,7 @@ class Camera:
             They name the parameter, what it expects and what came.
         """
         view = _camera_arguments.view(eye, target, up)
-        fov_y_deg = _arguments.number("fov_y_deg", fov_y_deg, above=0.0, below=180.0)
+        fov_y_deg = _camera_arguments.field_of_view("fov_y_deg", fov_y_deg)
         image = _camera_arguments.perspective_image(size, near, far, reversed_z)
         inner = CoreCamera.perspective(**view, fov_y=math.radians(fov_y_deg), **image)
         return cls._made(inner, "look_at", **view, fov_y_deg=fov_y_deg, **image)
@@ -478,7 +478,7 @@ class Camera:
             clip_from_camera = _pinhole(k, pixel_center, image) @ _OPENCV_FROM_OPENGL
         else:
             given = fov_x_deg if way == "fov_x_deg" else fov_y_deg
-            angle = _arguments.number(way, given, above=0.0, below=180.0)
+            angle = _camera_arguments.field_of_view(way, given, stacklevel=4)
             seen = {way: angle}
             height, width = image["size"]
             side = width if way == "fov_x_deg" else height

@@ -261,6 +261,9 @@ def no_data_of(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
     for value in invalid:
         if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
             raise TypeError(f"invalid: expected {expected}, got {_arguments.describe(value)} in it")
+        if float(value) == np.inf and dtype.kind == "f":
+            found.append(np.inf)  # otherwise it means that nothing is there
+            continue
         if not np.isfinite(float(value)):
             continue  # never a depth in any case
         held = float(value)

@@ -3,6 +3,8 @@
 Its methods stand in the order of the data.
 A depth image, rendered from occluders or an array, becomes a pyramid, and a cull tests instances
 against the pyramid.
+This file has their documentation; what takes more than a few lines is in `rendering`, `building`
+and `culling`.
 The interpreter lock is released while the device works.
 All objects may be used from any thread, also at the same time.
 """
@@ -17,34 +19,30 @@ from . import _arguments
 from ._core import Engine as CoreEngine
 from ._core import MeshTable as CoreMeshTable
 from ._core import TwoPasses as CoreTwoPasses
-from ._on_device import StaysInProcess, check_owner
+from ._on_device import StaysInProcess, check_owner, owned
 from ._processes import driver_is_asked
 from ._types import Depths, FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
 from .approximate import ApproximateResult
 from .bounds import Bounds, are_points, as_arrays
+from .building import check_side, of_arrays, of_image, receivers
 from .camera import Camera
-from .drawing import Drawing, chosen, limit
-from .errors import LimitError
-from .hints import Question
+from .culling import check_coverage, checked_pyramid, culled, culled_views
 from .mesh import as_meshes
 from .options import Outputs, cull_options, cull_request
-from .progress import Progress, check_progress
-from .renewal import Source
+from .rendering import rendered
 from .resources import (
-    A_PYRAMID,
     SOME_INSTANCES,
-    SOME_OCCLUDERS,
     DepthImage,
     Instances,
     Occluders,
     Pyramid,
 )
-from .result import CullResult
 from .samples import checked_samples
 from .temporal import PassResult, Temporal
 from .timing import StageTimes
-from .views import ViewsResult, among_of, pairs
+from .views import ViewsResult, among_of
+from .warming import checked_more
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -55,11 +53,11 @@ if TYPE_CHECKING:
     from ._arguments import Size
     from ._on_device import OnDevice
     from ._types import DepthKind, Levels, Output
-    from .depth import DepthArray
     from .mesh import MeshLike
     from .methods.occlusion_map import MapResult, OcclusionMap
     from .options import CullKeywords, CullOptions, MeshLods, OptionKeywords
     from .progress import ProgressLike
+    from .result import CullResult
     from .tolerance import Tolerance
     from .views import _AmongLike
 
@@ -393,49 +391,18 @@ class Device(StaysInProcess):
         set-up" (2005): when one triangle covers a pixel.
         The step to whole surfaces is this library's own.
         """
-        _arguments.instance("occluders", occluders, Occluders, *SOME_OCCLUDERS)
-        check_owner("occluders", occluders, self)
-        conservative = _arguments.flag("conservative", conservative)
-        refinement = _arguments.integer("refinement", refinement, low=0, high=8)
-        _arguments.choice("rasteriser", rasteriser, words(Rasteriser))
-        check_progress(progress)
-        drawing = Drawing(
-            chosen("only", only, occluders),
-            limit("max_triangles", max_triangles),
-            limit("max_occluders", max_occluders),
+        return rendered(
+            self,
+            occluders,
+            camera,
+            size=size,
+            conservative=conservative,
+            refinement=refinement,
+            rasteriser=rasteriser,
+            into=into,
+            drawing=(only, max_triangles, max_occluders),
+            progress=progress,
         )
-        if into is not None:
-            _arguments.instance("into", into, DepthImage, "a DepthImage of Device.render_depth")
-            check_owner("into", into, self)
-            for name, value, default in (
-                ("size", size, None),
-                ("conservative", conservative, False),
-                ("rasteriser", rasteriser, "auto"),
-            ):
-                if value != default:
-                    raise ValueError(f"{name}: expected {default!r} beside into, got {value!r}")
-            if camera is not None and camera != into.camera:
-                raise ValueError(
-                    f"camera: expected None or that of into, {into.camera!r}, got {camera!r}"
-                )
-            return self._engine.render_depth_into(into._inner, occluders._inner, *drawing)
-        camera = _arguments.instance("camera", camera, Camera, "a Camera")
-        if size is not None:
-            camera = camera.resized(size)
-        if conservative:
-            if any(part is not None for part in drawing) or rasteriser != "auto":
-                raise ValueError(
-                    "conservative: expected False beside rasteriser, only, max_triangles and "
-                    "max_occluders, got True"
-                )
-            with Progress(progress, "conservative depth", 1) as steps:
-                drawn = self._engine.render_depth_conservative(
-                    occluders._inner, camera._inner, refinement
-                )
-                steps.step()
-            return DepthImage(self, drawn, camera)
-        drawn = self._engine.render_depth(occluders._inner, camera._inner, rasteriser, *drawing)
-        return DepthImage(self, drawn, camera)
 
     @overload
     def pyramid(
@@ -506,11 +473,13 @@ class Device(StaysInProcess):
             - ``"distance"``: distance to the eye along the pixel's ray in world units.
 
             "No data" counts as infinitely far.
-            It is NaN, infinity, the numbers of `invalid`, and what lies outside the camera's
-            planes.
+            It is NaN, the numbers of `invalid`, and what lies outside the camera's planes.
             For ``"z"`` and ``"distance"`` it is zero and negative numbers, too.
             An orthographic camera with ``near < 0`` is the exception: it sees behind its eye, so
             negative numbers and a float zero are depth.
+
+            Infinity is far, too: for ``"z"`` and ``"distance"`` it means that nothing is there.
+            List it in `invalid` where it means "no data".
         scale : float
             World units of one step, for the kinds ``"z"`` and ``"distance"``: 0.001 for
             millimetres.
@@ -552,6 +521,8 @@ class Device(StaysInProcess):
               Culls of shadow casters take it, and no others do.
 
             The ends differ in what "no data" counts as: far in the farthest, near in the nearest.
+            For ``"z"`` and ``"distance"`` infinity and what lies beyond the far plane are far in
+            both: they are farther than all that is in the view.
 
             For ``"receivers"`` background is left out: pixels with exactly the depth of far, which
             is what a depth buffer is cleared to.
@@ -583,48 +554,12 @@ class Device(StaysInProcess):
         stored = _arguments.stored_levels("levels", levels)
         _arguments.choice("depths", depths, words(Depths))
         if isinstance(depth, DepthImage):
-            for name, value in (("camera", camera), ("kind", kind), ("invalid", invalid)):
-                if value is not None:
-                    got = _arguments.describe(value)
-                    expected = "nothing beside a DepthImage, which has its own"
-                    raise TypeError(f"{name}: expected {expected}, got {got}")
-            if tolerance is not None:
-                got = _arguments.describe(tolerance)
-                raise TypeError(
-                    "tolerance: expected None beside a DepthImage, whose depth stays; to move it "
-                    f"pass depth.numpy(), depth.camera and kind=depth.kind, got {got}"
-                )
-            if _arguments.number("scale", scale, above=0.0) != 1.0:
-                raise ValueError(
-                    f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}"
-                )
-            check_owner("depth", depth, self)
-            source = Source(depth._inner)
-            built = self._engine.pyramid(depth._inner, stored, depths)
-            return Pyramid(self, built, depth.camera, source, is_rendered=True, depths=depths)
+            given = {"camera": camera, "kind": kind, "invalid": invalid, "tolerance": tolerance}
+            return of_image(self, depth, stored, depths, scale=scale, **given)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
-        self._check_side(camera)
+        check_side(self, camera)
         samples = checked_samples("depth", depth, camera, kind, scale, invalid, tolerance)
-        return self._pyramid_of(samples, camera, stored, invalid, depths)
-
-    def _pyramid_of(
-        self,
-        images: DepthArray | list[DepthArray],
-        camera: Camera,
-        stored: tuple[int, int],
-        invalid: Any = None,
-        depths: Depths = "farthest",
-    ) -> Pyramid:
-        """The pyramid of an image that was checked, or of one per sample; with levels `stored`."""
-        given = images if isinstance(images, list) else [images]
-        if len(given) == 1:
-            uploaded = self._engine.upload_depth(*given[0], camera._inner, depths)
-        else:
-            planes = [plane.image for plane in given]
-            uploaded = self._engine.upload_samples(planes, *given[0][1:], camera._inner, depths)
-        source = Source.uploaded(uploaded, given, invalid)
-        built = self._engine.pyramid(uploaded, stored, depths)
-        return Pyramid(self, built, camera, source, depths=depths)
+        return of_arrays(self, samples, camera, stored, invalid, depths)
 
     def receiver_mask(
         self,
@@ -695,39 +630,16 @@ class Device(StaysInProcess):
         >>> device.cull(casters, light, device.pyramid(mask)).mask
         array([ True, False])
         """
-        camera = _arguments.instance("camera", camera, Camera, "a Camera")
-        light_camera = _arguments.instance("light_camera", light_camera, Camera, "a Camera")
-        self._check_side(light_camera)
-        radius = _arguments.number("filter_radius", filter_radius, at_least=0.0, at_most=2.0**60)
-        reach = _arguments.number("reach_px", reach_px, at_least=0.0, at_most=16.0)
-        if reach * 256.0 != round(reach * 256.0):
-            raise ValueError(f"reach_px: expected a multiple of 1/256, got {reach}")
-        slacks = (
-            _arguments.number("depth_slack", depth_slack, at_least=0.0, at_most=0.5),
-            _arguments.number("depth_slack_abs", depth_slack_abs, at_least=0.0, at_most=0.5),
+        return receivers(
+            self,
+            depth,
+            camera,
+            light_camera,
+            kind=kind,
+            filter_radius=filter_radius,
+            reach_px=reach_px,
+            slacks=(depth_slack, depth_slack_abs),
         )
-        if isinstance(depth, DepthImage):
-            check_owner("depth", depth, self)
-            if kind is not None:
-                got = _arguments.describe(kind)
-                raise TypeError(f"kind: expected None beside a DepthImage, got {got}")
-            if camera != depth.camera:
-                raise ValueError(
-                    f"camera: expected that of the depth image, {depth.camera!r}, got {camera!r}"
-                )
-            image = depth._inner
-        else:
-            self._check_side(camera)
-            given = checked_samples("depth", depth, camera, kind, 1.0, None)
-            if isinstance(given, list) and len(given) != 1:
-                raise ValueError(
-                    f"depth: expected one sample per pixel, got {len(given)}: the farthest of them "
-                    "is not all that receives shadows"
-                )
-            one = given[0] if isinstance(given, list) else given
-            image = self._engine.upload_depth(*one, camera._inner, "receivers")
-        made = self._engine.receiver_mask(image, light_camera._inner, radius, reach, slacks)
-        return DepthImage(self, made, light_camera)
 
     @overload
     def cull(
@@ -827,58 +739,15 @@ class Device(StaysInProcess):
         LimitError, OutOfMemoryError
             If the device cannot hold the outputs.
         """
-        _arguments.instance("instances", instances, Instances, *SOME_INSTANCES)
-        check_owner("instances", instances, self)
+        owned("instances", instances, Instances, *SOME_INSTANCES, device=self)
         options, outputs = cull_request(options, outputs, keywords)
         wait = _arguments.flag("wait", wait)
         restriction = among_of(among, instances, self)
+        request = options, outputs, restriction, wait
         if isinstance(camera, Camera):
-            _arguments.instance("pyramid", pyramid, Pyramid, *A_PYRAMID)
-            assert isinstance(pyramid, Pyramid)
-            check_owner("pyramid", pyramid, self)
-            if camera != pyramid.camera:
-                raise ValueError(_other_camera("camera", camera, pyramid))
-            _check_coverage("coverage", options, pyramid)
-            culling = self._engine.cull(
-                instances._inner,
-                camera._inner,
-                pyramid._inner,
-                options,
-                outputs,
-                self._mesh_table(outputs.meshes),
-                restriction,
-                not wait,
-            )
-            return CullResult(self, culling, Question(camera, pyramid, options, *instances._known))
-        cameras, pyramids = pairs(camera, pyramid, self)
-        for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
-            if one != of.camera:
-                raise ValueError(_other_camera(f"camera[{number}]", one, of))
-            _check_coverage("coverage", options, of)
-        if outputs.pixels:
-            raise ValueError(
-                "pixels: expected False beside several cameras, got True: counts are those of one "
-                "view, so cull them one by one"
-            )
-        if outputs.meshes is not None:
-            raise ValueError(
-                f"meshes: expected None beside several cameras, got {len(outputs.meshes)}: levels "
-                "of detail are chosen for each view, so cull them one by one"
-            )
-        culled = self._engine.cull_views(
-            instances._inner,
-            [one._inner for one in cameras],
-            [one._inner for one in pyramids],
-            options,
-            outputs,
-            restriction,
-            not wait,
-        )
-        questions = [
-            Question(one, of, options, *instances._known)
-            for one, of in zip(cameras, pyramids, strict=True)
-        ]
-        return ViewsResult(self, culled, questions)
+            table = self._mesh_table(outputs.meshes)
+            return culled(self, instances, camera, pyramid, *request, table)
+        return culled_views(self, instances, camera, pyramid, *request)
 
     def cull_approximate(
         self,
@@ -922,16 +791,12 @@ class Device(StaysInProcess):
         LimitError, OutOfMemoryError
             If the device cannot hold the counts.
         """
-        _arguments.instance("instances", instances, Instances, *SOME_INSTANCES)
-        check_owner("instances", instances, self)
+        owned("instances", instances, Instances, *SOME_INSTANCES, device=self)
         _arguments.instance("camera", camera, Camera, "a Camera")
-        _arguments.instance("pyramid", pyramid, Pyramid, *A_PYRAMID)
-        check_owner("pyramid", pyramid, self)
-        if camera != pyramid.camera:
-            raise ValueError(_other_camera("camera", camera, pyramid))
+        checked_pyramid(self, camera, pyramid)
         options = cull_options(options, keywords)
         negligible = _arguments.integer("negligible_px", negligible_px, low=0, high=2**32 - 1)
-        _check_coverage("coverage", options, pyramid)
+        check_coverage(options, pyramid)
         culling = self._engine.cull_approximate(
             instances._inner,
             camera._inner,
@@ -1080,6 +945,10 @@ class Device(StaysInProcess):
         *,
         occluders: Occluders | None = None,
         levels: Levels = None,
+        depths: Depths = "farthest",
+        two_passes: bool = False,
+        samples: int = 1,
+        views: int = 1,
         **keywords: Unpack[CullKeywords],
     ) -> None:
         """Compiles what frames with these options need, before the first of them.
@@ -1109,8 +978,14 @@ class Device(StaysInProcess):
         occluders : Occluders, optional
             Of this device; then the depth of the frames is rendered (`render_depth`).
             None: it comes from arrays.
-        levels : int or pair of int, optional
+        levels, depths
             As for `pyramid`.
+        two_passes : bool
+            Whether frames have two passes (`temporal`), with `options` in the late one.
+        samples : int
+            How many samples per pixel the arrays of depth have: 1, 2, 4, 8 or 16.
+        views : int
+            How many cameras one call of `cull` has, 1 to 256.
 
         Raises
         ------
@@ -1135,22 +1010,25 @@ class Device(StaysInProcess):
         _arguments.instance("instances", instances, Instances, *SOME_INSTANCES)
         check_owner("instances", instances, self)
         _arguments.instance("camera", camera, Camera, "a Camera")
-        self._check_side(camera)
+        check_side(self, camera)
         if occluders is not None:
             expected = "Occluders of Device.occluders or None"
             _arguments.instance("occluders", occluders, Occluders, expected)
             check_owner("occluders", occluders, self)
         stored = _arguments.stored_levels("levels", levels)
-        options, outputs = cull_request(options, outputs, keywords)
+        _arguments.choice("depths", depths, words(Depths))
         drawn = None if occluders is None else occluders._inner
+        more = checked_more(two_passes, samples, views, is_drawn=drawn is not None)
+        options, outputs = cull_request(options, outputs, keywords)
         self._engine.warm_up(
             instances._inner,
             camera._inner,
             drawn,
-            stored,
+            (stored, depths),
             options,
             outputs,
             self._mesh_table(outputs.meshes),
+            more,
         )
 
     def _mesh_table(self, meshes: Sequence[MeshLods] | None) -> CoreMeshTable | None:
@@ -1164,12 +1042,6 @@ class Device(StaysInProcess):
         table = self._engine.mesh_table([mesh._raw() for mesh in meshes])
         self._tables = [*self._tables[1 - _TABLES_KEPT :], (meshes, table)]
         return table
-
-    def _check_side(self, camera: Camera) -> None:
-        """Refuses an image that the device cannot hold, before its array is converted."""
-        side = max(camera.size)
-        if side > self.max_image_side:
-            raise LimitError("image side in pixels", side, self.max_image_side)
 
     def timed(self) -> StageTimes:
         """Times the stages that run in a ``with`` block: raster, reduction, cull, list, update.
@@ -1226,23 +1098,3 @@ def maker_of(thing: OnDevice[Any]) -> Device:
     device = thing.device
     assert isinstance(device, Device)
     return device
-
-
-def _check_coverage(name: str, options: CullOptions, pyramid: Pyramid) -> None:
-    """Refuses sample coverage for the farthest of several samples."""
-    if options.coverage == "sample" and pyramid._source.samples > 1:
-        raise ValueError(
-            f'{name}: expected "area" for a pyramid of the farthest of {pyramid._source.samples} '
-            'samples per pixel, which lie beside the pixels\' centres, got "sample"'
-        )
-
-
-def _other_camera(name: str, camera: Camera, pyramid: Pyramid) -> str:
-    """Why a camera cannot cull with the pyramid of another one, and the way out."""
-    way = "depth of one camera says nothing about another one"
-    if camera.resized(pyramid.size) == pyramid.camera:
-        way = (
-            f"pass camera.resized({pyramid.size}), the same view; "
-            "the promise is about an image of that size"
-        )
-    return f"{name}: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}"

@@ -28,7 +28,7 @@ class HizError(Exception):
 
 
 class HizWarning(UserWarning):
-    """A cull is right as it was asked, but looks like a mistake: see `CullResult.hints`."""
+    """A call is right as it was asked, but looks like a mistake: see `CullResult.hints`."""
 
 
 class NoAdapterError(HizError):

@@ -61,7 +61,7 @@ class _Levels(Protocol):
 class Explanation(PicturedExplanation):
     """How the verdict of one instance came about: the cull's test of it, run once more.
 
-    A member of a group of 64 that was hidden as a whole was never tested by itself.
+    A member of a group of 64 that was culled as a whole was never tested by itself.
     Its verdict is that of the group (see `group`), or `Verdict.OUTSIDE` where its own test says so.
     Everything else here is from its own test, which may have kept it.
     """
@@ -109,7 +109,7 @@ class Explanation(PicturedExplanation):
     """Whether the instance was updated since the cull. Then all of this is about its new bounds,
     and the verdict of the cull may be another."""
     group: Explanation | None
-    """For a member of a group that was hidden as a whole: the test of the box around the group.
+    """For a member of a group that was decided as a whole: the test of the box around the group.
     None for all others."""
 
     #: What was read, for `plot`; it is no part of the value, and copies are without it.

@@ -4,6 +4,8 @@ No hint changes a result.
 Each says something that holds for all instances or all pixels, so a scene that is as it should be
 gets none.
 `hizvk.visible` warns of them (`HizWarning`), and `CullResult.hints` returns them.
+That everything in view is hidden is often right, so `CullResult.hints` says it, and `visible` warns
+of it only where the numbers tell more (`unit_hints`).
 """
 
 from __future__ import annotations
@@ -15,6 +17,8 @@ import numpy as np
 
 from .bounds import Boxes, Points
 from .camera import Camera
+from .sparse import is_sparse
+from .unit_hints import all_are_hidden, none_is_hidden, whole_without_scale
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -25,14 +29,10 @@ if TYPE_CHECKING:
     from .remembered import Remembered
     from .resources import Pyramid
 
-__all__ = ["Counted", "Question", "Tally", "posed_otherwise"]
+__all__ = ["Counted", "Question", "Tally", "middles_of", "posed_otherwise"]
 
 #: The most instances whose middles are looked at through other poses.
 MOST_MIDDLES: Final = 4096
-#: Depth is sparse if a smaller share of the pixels than this has any,
-SPARSE_PIXELS: Final = 0.25
-#: and a smaller share of those than this begins a full block of 2x2.
-SPARSE_BLOCKS: Final = 0.1
 #: The level that is looked at first: where one of its texels is not far, depth is dense somewhere.
 COARSE: Final = 3
 #: OpenCV's camera axes from OpenGL's, and the reverse: half a turn about x.
@@ -128,9 +128,25 @@ class Question:
                 f"bounds: all {stats.tested:,} are invalid, so all are kept: a number is NaN or "
                 "infinite, a size is negative, or min is above max",
             )
-        if stats.occluded or stats.kept == stats.invalid:
-            return ()
-        return self._depth()
+        if stats.kept == stats.invalid:
+            return self._all_hidden(bounds) if stats.occluded else ()
+        return () if stats.occluded else self._depth(bounds)
+
+    def _all_hidden(self, bounds: Bounds | None) -> tuple[str, ...]:
+        return all_are_hidden(
+            self.camera, middles_of(self._known_bounds(bounds)), self.depths, asked=True
+        )
+
+    def _known_bounds(self, bounds: Bounds | None) -> Bounds | None:
+        return bounds if bounds is not None or self.remembered is None else self.remembered.bounds()
+
+    def depths(self) -> npt.NDArray[np.float64]:
+        """View depths of the coarsest level that still says much; empty if the camera has none."""
+        level = max((k for k in self.pyramid.levels if k <= COARSE), default=0)
+        try:
+            return self.pyramid.level(level, kind="z").astype(np.float64)
+        except ValueError:  # an orthographic camera made from a bare matrix
+            return np.zeros((0, 0))
 
     def _known(self, level: int) -> npt.NDArray[np.bool_]:
         """The texels of a level that can hide something: those with a depth that is not far."""
@@ -139,11 +155,15 @@ class Question:
             return (depth > 0.0) & (depth <= 1.0)
         return (depth >= 0.0) & (depth < 1.0)
 
-    def _depth(self) -> tuple[str, ...]:
+    def _depth(self, bounds: Bounds | None) -> tuple[str, ...]:
         """Hints at an image that hid nothing of what is in view."""
         coarse = max((k for k in self.pyramid.levels if k <= COARSE), default=0)
         if self._known(coarse).any():
-            return ()
+            if self.pyramid._is_rendered:
+                return ()  # in the units of the occluders
+            is_whole = whole_without_scale(self.pyramid._source.given)
+            middles = middles_of(self._known_bounds(bounds))
+            return none_is_hidden(self.camera, middles, self.depths, is_whole=is_whole)
         known = self._known(0)
         if not known.any():
             return (
@@ -151,10 +171,9 @@ class Question:
                 "there, check kind and scale: numbers that do not lie between the camera's near "
                 "and far planes count as no data",
             )
-        full = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
         if self.pyramid._is_rendered:
             return ()  # no depth is missing: what is far is sky
-        if known.mean() < SPARSE_PIXELS and full.sum() < SPARSE_BLOCKS * known.sum():
+        if is_sparse(known):
             return (
                 f"depth: {100.0 * known.mean():.1f} % of the pixels have a depth, hardly any of "
                 "them beside another, and empty ones are far, so next to nothing can be hidden; if "
@@ -207,14 +226,15 @@ def posed_otherwise(camera: Camera) -> list[tuple[str, Camera]]:
 
 def _in_view(camera: Camera, bounds: Bounds | None) -> int:
     """How many middles of bounds lie in the view; of many bounds, some are looked at."""
-    middles = _middles(bounds)
+    middles = middles_of(bounds)
     clip = np.c_[middles, np.ones(len(middles))] @ camera.clip_from_world.T
     x, y, z, w = clip.T
     with np.errstate(invalid="ignore"):
         return int(((np.abs(x) <= w) & (np.abs(y) <= w) & (z >= 0.0) & (z <= w) & (w > 0.0)).sum())
 
 
-def _middles(bounds: Bounds | None) -> npt.NDArray[np.float64]:
+def middles_of(bounds: Bounds | None) -> npt.NDArray[np.float64]:
+    """``(N, 3)``: the middles of bounds; of many bounds, some are looked at."""
     match bounds:
         case None:
             return np.zeros((0, 3))

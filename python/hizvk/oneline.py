@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 from . import _arguments
 from ._processes import per_process
 from .bounds import Bounds, Points, are_points, as_arrays
+from .building import check_side, of_arrays
 from .camera import Camera
 from .depth import checked_image
 from .device import Device, maker_of
 from .errors import HizWarning
-from .hints import Counted, Question, Tally
+from .hints import Counted, Question, Tally, middles_of
 from .options import Outputs, cull_options
 from .resources import DepthImage, Pyramid
+from .unit_hints import all_are_hidden, sampled
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -124,7 +126,7 @@ def visible(
     HizWarning
         If the call looks like a mistake, as in `CullResult.hints`: all bounds are outside of the
         view, points of size zero with ``coverage="sample"``, depth that is far everywhere or
-        sparse.
+        sparse, units that differ.
 
     Examples
     --------
@@ -159,17 +161,23 @@ def visible(
         def pyramid_again() -> Pyramid:
             return pyramid
 
+        def depths() -> npt.NDArray[np.float64]:
+            return Question(camera, pyramid, options, False).depths()
+
     else:
         if device is not None:
-            device._check_side(camera)
+            check_side(device, camera)
         image = checked_image("depth", depth, camera, kind, scale, invalid, tolerance)
         maker = device = default_device() if device is None else device
         mask, counts = device._engine.cull_once(kind_and_arrays, camera._inner, image, options)
         stored = _arguments.stored_levels("levels", None)
 
         def pyramid_again() -> Pyramid:
-            return maker._pyramid_of(image, camera, stored)
+            return of_arrays(maker, image, camera, stored)
 
+        depths = sampled(image, camera)
+
+    hints: tuple[str, ...] = ()
     # Points have a guard of their own.
     points = options.coverage == "sample" and not isinstance(bounds, Points) and are_points(bounds)
     # What hides some of the first bounds gives no cause for a hint.
@@ -179,6 +187,10 @@ def visible(
         if tally.tested < len(bounds) and not points:
             instances = device.instances(bounds, order="given")
             tally = device.cull(instances, camera, question.pyramid, options, _COUNTS).stats
-        for hint in question.hints(tally, bounds):
-            warnings.warn(hint, HizWarning, stacklevel=2)
+        hints = question.hints(tally, bounds)
+    elif not mask.any():
+        # Of all that is in view, nothing is kept.
+        hints = all_are_hidden(camera, middles_of(bounds), depths, asked=False)
+    for hint in hints:
+        warnings.warn(hint, HizWarning, stacklevel=2)
     return mask

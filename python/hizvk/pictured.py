@@ -24,11 +24,14 @@ if TYPE_CHECKING:
     from .mesh import MeshLike
     from .show.explained import Explained
     from .show.levels import Levels
+    from .show.views import Views
 
     #: Reads one level as depth of a kind.
     _Read = Callable[[DepthKind | None], npt.NDArray[np.float32]]
 
-__all__ = ["PicturedDepth", "PicturedExplanation", "PicturedPyramid", "PicturedResult"]
+__all__ = [
+    "PicturedDepth", "PicturedExplanation", "PicturedPyramid", "PicturedResult", "PicturedViews",
+]  # fmt: skip
 
 #: The most instances in a figure and in a page, unless the caller says otherwise.
 MOST = 20_000
@@ -130,10 +133,8 @@ class PicturedPyramid(_Shown):
         ----------
         end : {"farthest", "nearest"}, optional
             As for `level`.
-        kind : {"z", "distance", "ndc", "reversed_ndc"}, optional
-            What is shown; None: view depth, or NDC depth where the camera does not say view depth.
-        unit : str
-            The unit of world positions, for the scale.
+        kind, unit : optional
+            As for `DepthImage.plot`.
 
         Returns
         -------
@@ -287,6 +288,48 @@ def _with_classes(seen: Any) -> Any:
             'outputs: expected "mask" or "verdicts" of a cull that is drawn, got neither'
         )
     return seen
+
+
+class PicturedViews(_Shown):
+    """`ViewsResult` as a picture: its views in rows, and a table of their counts."""
+
+    def _picture(self) -> Views:
+        from .show.views import views_of
+
+        return views_of(self, None, must_know=False)
+
+    def plot(self, bounds: Bounds | None = None, *, most: int = 500, unit: str = "m") -> Any:
+        """Draws each view with what it kept (white) and culled (red); of many views, twelve.
+
+        ``result[v].plot()`` draws one view, and the scene from above.
+
+        Parameters
+        ----------
+        bounds : Spheres, Boxes, OrientedBoxes or Points, optional
+            As for `CullResult.plot`.
+        most : int
+            At most so many instances are drawn in each view, evenly chosen.
+        unit : str
+            The unit of world positions.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it, and ``savefig(path)`` writes it.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed; the text has the line that installs it.
+        TypeError, ValueError
+            They name the parameter, what it expects and what came; also if the cull made neither
+            masks nor verdicts.
+        """
+        from .show.views import views_of
+
+        views = views_of(self, bounds, _arguments.text("unit", unit))
+        _with_classes(views.seen[0][1])
+        return views.plot(_arguments.integer("most", most, low=1, high=2**31 - 1))
 
 
 class PicturedExplanation(_Shown):

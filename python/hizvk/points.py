@@ -6,6 +6,7 @@ What is added up afterwards is plain arithmetic.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sized
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -18,10 +19,12 @@ from ._types import ColourWeight, DepthKind, Sampling, words
 from .bounds import Points
 from .camera import Camera
 from .device import Device
+from .errors import HizWarning
 from .oneline import default_device
 from .options import Outputs, cull_options
 from .progress import Progress
 from .resources import DepthImage
+from .sparse import is_sparse
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -38,6 +41,8 @@ __all__ = ["PointColours", "colour_points", "depth_from_points"]
 
 #: What `points` takes.
 _A_CLOUD: Final = "Points, as hizvk.Points(xyz) makes them"
+#: Fewer pixels with a depth than this are a trial and not a cloud.
+_LEAST_KNOWN: Final = 32
 #: What a cull makes here.
 _MASK: Final = Outputs(mask=True, verdicts=False, indices=False, draws=False)
 
@@ -100,6 +105,7 @@ def colour_points(
     weight : "equal" or "near"
         ``"equal"``: each view that sees a point counts alike.
         ``"near"``: by the inverse square of its view depth.
+        An orthographic camera shows nothing larger from nearby, so there it is as ``"equal"``.
     device : Device, optional
         None: the default device of `visible`.
     options : CullOptions, optional
@@ -213,6 +219,8 @@ def depth_from_points(
 
     - Where they leave holes, pixels stay far, and nothing behind them is hidden.
       A radius of half the points' spacing closes most holes.
+      Without a radius each point covers one pixel alone, so an image of more pixels than points
+      hides next to nothing.
     - Where they reach beyond the surface, or cut a corner of it, they hide what may be seen there:
       up to the radius beside a silhouette.
 
@@ -226,9 +234,10 @@ def depth_from_points(
     camera : Camera
         Whose image it is.
     radius : float
-        Of the discs, in world units.
+        Of the discs, in world units: half the distance between neighbours, or a little more.
     radius_px : float
         The least radius in the image, in pixels; 0.5 to 1.5 close the holes between close points.
+        With 0 and without `radius`, each point covers the pixel that it lies in.
 
     Returns
     -------
@@ -239,6 +248,11 @@ def depth_from_points(
     ------
     TypeError, ValueError
         They name the parameter, what it expects and what came.
+
+    Warns
+    -----
+    HizWarning
+        If there is no radius, and hardly any pixel with a depth is beside another.
 
     Examples
     --------
@@ -252,5 +266,16 @@ def depth_from_points(
     camera = _arguments.instance("camera", camera, Camera, "a Camera")
     radius = _arguments.number("radius", radius, at_least=0.0)
     radius_px = _arguments.number("radius_px", radius_px, at_least=0.0, at_most=1024.0)
-    image = depth_of_points(points.positions, camera._inner, radius, radius_px)
-    return image.reshape(camera.size)
+    flat = depth_of_points(points.positions, camera._inner, radius, radius_px)
+    image: npt.NDArray[np.float32] = flat.reshape(camera.size)
+    if not radius and not radius_px:
+        known = image > 0.0 if camera.reversed_z else image < 1.0
+        if known.sum() >= _LEAST_KNOWN and is_sparse(known):
+            warnings.warn(
+                f"radius: each point covers one pixel, and {100.0 * known.mean():.1f} % of the "
+                "pixels have a depth, so next to nothing can be hidden; pass radius=, half the "
+                "distance between neighbours, or radius_px=1",
+                HizWarning,
+                stacklevel=2,
+            )
+    return image

@@ -368,11 +368,7 @@ class Pyramid(PicturedPyramid, _Seen, Allocated[CorePyramid]):
         if end is None:
             end = "nearest" if alone == "nearest" else "farthest"
         _arguments.choice("end", end, words(DepthEnd) if alone is None else (alone,))
-        last = self.num_levels - 1
-        try:
-            k = _arguments.integer("k", k, low=0, high=last)
-        except ValueError:
-            raise IndexError(f"k: expected a level in 0..{last}, got {k}") from None
+        k = _arguments.index("k", k, self.num_levels, what="a level", none="there is none")
         if k > 0 and k not in self.levels:
             raise IndexError(f"k: expected 0 or a level that is stored, {self._stored()}, got {k}")
         size, texels = self._inner.read_level(k, end == "nearest")

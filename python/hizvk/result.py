@@ -323,6 +323,8 @@ class CullResult(PicturedResult, Awaited[CoreCulling]):
         - Everything is outside of the view.
         - The bounds are points of size zero, with ``coverage="sample"``.
         - Depth is far everywhere, or sparse.
+        - Everything in view is hidden, or nothing is, and units that differ would be the reason.
+          That all is hidden is also said where it may be right; `visible` does not warn of that.
 
         It is cheap beside a cull, except for an image that hides nothing, which may be read back.
 
@@ -351,14 +353,7 @@ class CullResult(PicturedResult, Awaited[CoreCulling]):
         IndexError
             If there is no such instance.
         """
-        count = len(self)
-        try:
-            index = _arguments.integer("index", index, low=0, high=count - 1)
-        except ValueError:
-            expected = (
-                f"an integer in 0..{count - 1}" if count else "nothing, for there are no instances"
-            )
-            raise IndexError(f"index: expected {expected}, got {index}") from None
+        index = _arguments.index("index", index, len(self), none="there are no instances")
         return explanation_of(index, self._inner.explain(index), self._question.pyramid)
 
     def _summary(self) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -15,10 +15,14 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-__all__ = ["fill_depth"]
+__all__ = ["fill_depth", "is_sparse"]
 
 #: More would take the depth of another part of the scene.
 LARGEST_RADIUS = 1024
+#: Depth is sparse if a smaller share of the pixels than this has any,
+SPARSE_PIXELS: Final = 0.25
+#: and a smaller share of those than this begins a full block of 2x2.
+SPARSE_BLOCKS: Final = 0.1
 
 
 def fill_depth(
@@ -110,6 +114,12 @@ def fill_depth(
             np.maximum(farthest, quarter, out=farthest)
             surrounded &= quarter > 0
     return np.where(surrounded, farthest, nothing)
+
+
+def is_sparse(known: npt.NDArray[np.bool_]) -> bool:
+    """Whether few pixels have a depth, and hardly any of them are beside another."""
+    full = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
+    return bool(known.mean() < SPARSE_PIXELS and full.sum() < SPARSE_BLOCKS * known.sum())
 
 
 def _farthest_after(depth: npt.NDArray[Any], radius: int) -> npt.NDArray[Any]:

@@ -17,6 +17,7 @@ from ._core import ViewsCulling as CoreViews
 from ._on_device import check_owner
 from ._processes import cached_property
 from .camera import Camera
+from .pictured import PicturedViews
 from .resources import Pyramid
 from .result import DRAW_DTYPE, CullResult, shared
 
@@ -35,10 +36,10 @@ if TYPE_CHECKING:
 __all__ = ["ViewsResult", "among_of", "pairs"]
 
 #: As `MAX_VIEWS` of the engine.
-_MOST_VIEWS = 256
+MOST_VIEWS = 256
 
 
-class ViewsResult(Awaited[CoreViews]):
+class ViewsResult(PicturedViews, Awaited[CoreViews]):
     """The answer of `Device.cull` for several cameras: one submission and one readback.
 
     It is a sequence of V results, one `CullResult` per view.
@@ -92,8 +93,9 @@ class ViewsResult(Awaited[CoreViews]):
         try:
             number = _arguments.integer("view", view, low=-count, high=count - 1)
         except ValueError:
+            hint = "; the first one is 0" if view == count else ""
             raise IndexError(
-                f"view: expected an integer in {-count}..{count - 1}, got {view}"
+                f"view: expected an integer in {-count}..{count - 1}, got {view}{hint}"
             ) from None
         return self._views[number]
 
@@ -168,8 +170,8 @@ def pairs(
                 raise TypeError(f"{name}[{number}]: expected a {kind.__name__}, got {got}")
             if isinstance(one, Pyramid):
                 check_owner(f"{name}[{number}]", one, device)
-        if not 1 <= len(given) <= _MOST_VIEWS:
-            raise ValueError(f"{name}: expected 1 to {_MOST_VIEWS} views, got {len(given)}")
+        if not 1 <= len(given) <= MOST_VIEWS:
+            raise ValueError(f"{name}: expected 1 to {MOST_VIEWS} views, got {len(given)}")
     assert isinstance(cameras, Sequence)
     assert isinstance(pyramids, Sequence)
     if len(cameras) != len(pyramids):

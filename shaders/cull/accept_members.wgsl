@@ -32,10 +32,10 @@ fn accept_members(
 ) {
     begin();
     let slot = workgroup.x * RUN + lane / SHARE;
-    if slot < survivors.accept_count {
+    if slot < parents.accept_count {
         // Accepted groups fill the list from its end.
         let groups = (piece.count + (GROUP - 1u)) / GROUP;
-        let group = textureLoad(survivor_list, survivor_position(groups - 1u - slot)).x;
+        let group = textureLoad(parent_list, survivor_position(groups - 1u - slot)).x;
         report_run(group, lane % SHARE, accept_run(group * GROUP + lane % SHARE));
     }
 }

@@ -54,3 +54,11 @@ fn surely_beyond(r: Value, t: f32, w: Value) -> bool {
     let side = select(1.0, -1.0, r.center < 0.0);
     return surely_above(Value(side * r.center, r.error, side * r.half), t, w);
 }
+
+// True implies: all of the volume is outside of one of the six planes of the frustum.
+fn surely_outside(x: Value, y: Value, z: Value, w: Value) -> bool {
+    let border = view.half_size + view.reach;
+    let a = view.z_slope;
+    return surely_beyond(x, border.x, w) | surely_beyond(y, border.y, w)
+        | surely_below(z, bar(-a), w) | surely_above(z, bar(1.0 - a), w);
+}

@@ -8,36 +8,15 @@
 // What is used here and defined elsewhere:
 //
 // - `certificate.wgsl`: `Value`, `value_of`, `errors_of`, `error_bound`, `surely_above`, `_below`
-//   and `_beyond`
+//   and `_outside`
 // - `view.wgsl`: `view`, `bar`
+// - `decision.wgsl`: `SAMPLE_COVERAGE`, `DESCENT`, `FIT_VOLUME`, thresholds
 // - `supporting_planes.wgsl`: `Projected`, `surely_clear`
 // - `outcome.wgsl`, `../output/verdict.wgsl`: `Outcome`, stages, verdicts
 // - `../instances/bounds_*.wgsl`: `load_volume`, `support`, `extent_of`, `surely_after`, `_before`
 // - `../pyramid/texels*.wgsl`, `../pyramid/levels.wgsl`: `texel`, `footprint`, `finest_level`
 // - `unoccluded.wgsl`: `surely_in_front`, `surely_inside`, `descend_in_front`
 // - `unexplained.wgsl` or `explain.wgsl`: `note_texel`, `note_clear`
-
-// True: only pixel centres count; otherwise whole pixel squares.
-override SAMPLE_COVERAGE: bool;
-// True: descend to finer levels where the footprint cannot decide.
-override DESCENT: bool;
-// True: compare each texel with the volume's own outline and front there.
-// Otherwise a texel is compared with the volume's rectangle at the volume's nearest depth.
-override FIT_VOLUME: bool;
-
-// An instance that is absent has its centre below this, on the first axis.
-// No other centre is there, relative to any reference point: both are below 2^60 in magnitude.
-// Half of `ABSENT_CENTER` in `crates/hiz_core/src/instances/volume_record.rs`.
-const ABSENT_BELOW: f32 = -0x1p61;
-
-// Below this w a ratio could overflow, as rows stay below 2^59.
-// The margins alone reach 2^-70, so this keeps next to nothing visible.
-const LEAST_W: f32 = 0x1p-66;
-
-// The rectangle is widened by what its certificate will ask for, and by a quarter of it more.
-const RECTANGLE_MARGIN: f32 = 1.25;
-// And by this many EPS of half an image, more than adding half an image rounds away.
-const WIDENING_ULPS: f32 = 4.0;
 
 // The first and last pixel that an extent may touch; if first > last there is none.
 // The extent is relative to the image's middle.
@@ -157,14 +136,11 @@ fn classify(i: u32) -> Outcome {
     let y = value_of(view.y, errors.y, volume);
     let z = value_of(view.z, errors.z, volume);
     let w = value_of(view.w, errors.w, volume);
-    let a = view.z_slope;
 
     // 1. Is it outside one of the six planes of the frustum?
     out.stage = AT_FRUSTUM;
     out.verdict = OUTSIDE;
-    let border = view.half_size + view.reach;
-    if surely_beyond(x, border.x, w) | surely_beyond(y, border.y, w)
-        | surely_below(z, bar(-a), w) | surely_above(z, bar(1.0 - a), w) {
+    if surely_outside(x, y, z, w) {
         return out;
     }
 

@@ -6,7 +6,7 @@ fn cull_members(
 ) {
     begin();
     let slot = workgroup.x * RUN + lane / SHARE;
-    if slot < survivors.count {
-        cull_run(textureLoad(survivor_list, survivor_position(slot)).x, lane % SHARE);
+    if slot < parents.count {
+        cull_run(textureLoad(parent_list, survivor_position(slot)).x, lane % SHARE);
     }
 }

@@ -26,17 +26,13 @@ fn candidates(group: u32, share: u32, first: u32) -> u32 {
 }
 
 // Tests the candidates among the members of a group that belong to one of its invocations.
+// Most of them are kept, so each is reported where it was tested: its record is at hand there.
 fn cull_run(group: u32, share: u32) {
     let first = group * GROUP + share;
-    var kept = 0u;
     for (var left = candidates(group, share, first); left != 0u; left &= left - 1u) {
-        let k = countTrailingZeros(left);
-        let place = first + k * SHARE;
+        let place = first + countTrailingZeros(left) * SHARE;
         if place < piece.count && is_candidate(classify(place)) {
-            kept |= 1u << k;
+            report(place);
         }
-    }
-    for (; kept != 0u; kept &= kept - 1u) {
-        report(first + countTrailingZeros(kept) * SHARE);
     }
 }

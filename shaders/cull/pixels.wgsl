@@ -89,10 +89,7 @@ fn prepare(i: u32, planes: ptr<function, PixelPlanes>) -> Prepared {
     let y = value_of(view.y, errors.y, volume);
     let z = value_of(view.z, errors.z, volume);
     let w = value_of(view.w, errors.w, volume);
-    let a = view.z_slope;
-    let border = view.half_size + view.reach;
-    if surely_beyond(x, border.x, w) | surely_beyond(y, border.y, w)
-        | surely_below(z, bar(-a), w) | surely_above(z, bar(1.0 - a), w) {
+    if surely_outside(x, y, z, w) {
         return answered(none);
     }
     let w_min = w.center - support(w.half) - error_bound(w, 0.0, w);

@@ -11,10 +11,11 @@
 // What is used here and defined elsewhere:
 //
 // - `pixels_sure.wgsl`: `place_of`, `beyond`, `sure_of`
-// - `pixels_row_*.wgsl`: `texel_row`, `nearest_row`, `pixel_row`
+// - `pixels_row_*.wgsl`: `texel_row`, `nearest_row`, `pixel_row`, `near_pixel_row`
 
 // True: a pixel of level 0 stands for all that its surface shows.
-// False: it is the farthest of several samples, which says nothing about what is behind the volume.
+// False: it is the farthest of several samples.
+// Then only the nearest one says what is behind the volume.
 override ONE_SAMPLE: bool;
 
 // Of coarse levels every other one is read.
@@ -213,9 +214,9 @@ fn read_pixels(
         let place =
             place_of(planes, columns, columns + vec4<u32>(1u), vec2<u32>(at.y, at.y + 1u));
         let raw = pixel_row(at.x, at.y);
-        var near = vec4<u32>(UNKNOWN_BITS);
-        if ONE_SAMPLE {
-            near = raw;
+        var near = raw;
+        if !ONE_SAMPLE {
+            near = near_pixel_row(at.x, at.y);
         }
         let outline = beyond(planes, place, 0.0);
         let sure = sure_of(planes, place, outline[0], raw, near);

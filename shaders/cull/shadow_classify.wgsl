@@ -3,22 +3,10 @@
 //
 // Culling rests on certificates alone (`shadow.wgsl`).
 // The rectangle, the level, divisions and conversions only choose what is tested.
-
-// True: receivers lie at pixel centres; otherwise anywhere in the pixels' squares.
-override SAMPLE_COVERAGE: bool;
-// Casters always descend, and have no outline of their own: both are here for the pipeline's key.
-override DESCENT: bool;
-override FIT_VOLUME: bool;
-
-// An instance that is absent has its centre below this, on the first axis.
-// The same as in `classify.wgsl`.
-const ABSENT_BELOW: f32 = -0x1p61;
-// Below this w a ratio could overflow, as rows stay below 2^59.
-const LEAST_W: f32 = 0x1p-66;
-// The rectangle is widened by what its certificate will ask for, and by a quarter of it more.
-const RECTANGLE_MARGIN: f32 = 1.25;
-// And by this many EPS of half an image, more than adding half an image rounds away.
-const WIDENING_ULPS: f32 = 4.0;
+//
+// With `SAMPLE_COVERAGE` receivers lie at pixel centres, otherwise anywhere in the pixels' squares.
+// Casters always descend, and have no outline of their own: `DESCENT` and `FIT_VOLUME` of
+// `decision.wgsl` change nothing here.
 
 // An estimate of the least and greatest r / w at one end of the sweep: at the caster itself with
 // side -1, at the other end with side 1.

@@ -47,14 +47,31 @@ fn sanitized(bits: u32) -> u32 {
     return select(flushed, far_bits(), outside);
 }
 
+fn sanitized4(v: vec4<u32>) -> vec4<u32> {
+    return vec4<u32>(sanitized(v.x), sanitized(v.y), sanitized(v.z), sanitized(v.w));
+}
+
 // The same for the nearest depth: what is no depth is near.
 fn sanitized_near(bits: u32) -> u32 {
     let outside = bits > ONE_BITS && bits != NEGATIVE_ZERO_BITS;
     return select(sanitized(bits), near_bits(), outside);
 }
 
+fn sanitized_near4(v: vec4<u32>) -> vec4<u32> {
+    return vec4<u32>(
+        sanitized_near(v.x), sanitized_near(v.y), sanitized_near(v.z), sanitized_near(v.w));
+}
+
 fn farthest(a: u32, b: u32) -> u32 {
     return select(max(a, b), min(a, b), REVERSED);
+}
+
+// The same of four pairs.
+fn farthest_each(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    if REVERSED {
+        return min(a, b);
+    }
+    return max(a, b);
 }
 
 fn farthest4(v: vec4<u32>) -> u32 {
@@ -63,6 +80,13 @@ fn farthest4(v: vec4<u32>) -> u32 {
 
 fn nearest(a: u32, b: u32) -> u32 {
     return select(min(a, b), max(a, b), REVERSED);
+}
+
+fn nearest_each(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    if REVERSED {
+        return max(a, b);
+    }
+    return min(a, b);
 }
 
 fn nearest4(v: vec4<u32>) -> u32 {
@@ -113,14 +137,17 @@ fn nearest_sanitized4(v: vec4<u32>) -> u32 {
 }
 
 // Background is what has exactly the bits of far, where -0 is 0.
+//
+// Both sides are always evaluated: `||` makes a branch, and a block of 64 pixels makes 64 of them.
+// SwiftShader then compiles a reduction for a minute or more, and else for 0.2 s.
 fn is_background(bits: u32) -> bool {
-    return bits == far_bits() || (REVERSED && bits == NEGATIVE_ZERO_BITS);
+    return (bits == far_bits()) | (REVERSED & (bits == NEGATIVE_ZERO_BITS));
 }
 
 // A pixel of level 0 as the farthest depth counts it.
 // Where only receivers count, background becomes near, and so leaves the farthest depth alone.
 fn foreground(bits: u32) -> u32 {
-    return select(bits, near_bits(), RECEIVERS && is_background(bits));
+    return select(bits, near_bits(), RECEIVERS & is_background(bits));
 }
 
 fn foreground4(v: vec4<u32>) -> vec4<u32> {

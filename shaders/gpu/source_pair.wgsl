@@ -8,7 +8,7 @@
 @group(0) @binding(7) var nearest_source: texture_storage_2d<rgba32uint, read>;
 
 fn far_of_pair(far: u32, near: u32) -> u32 {
-    return select(far, near_bits(), RECEIVERS && is_background(near));
+    return select(far, near_bits(), RECEIVERS & is_background(near));
 }
 
 fn far_of_pair4(far: vec4<u32>, near: vec4<u32>) -> vec4<u32> {

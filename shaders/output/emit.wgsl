@@ -1,6 +1,7 @@
 // What the passes of the emit stage share.
 //
 // A cull leaves a bit plane per level of detail, with a bit per slot (`report_planes.wgsl`).
+// One plane or four make a set (`emit_planes.wgsl`).
 // These passes make lists and draw arguments of the planes, in the order of their dispatches:
 //
 // 1. `emit_block` and `emit_top` count the bits before each word of all planes.
@@ -44,7 +45,9 @@ struct BinRange {
     count: u32,
     // Added to the rank of an instance: where the list holds it.
     shift: u32,
-    padding: u32,
+    // In the first bin of an invocation of `emit_bins`: how many bins are not empty, of this
+    // invocation and of earlier ones of its workgroup.
+    filled: u32,
 }
 
 // A draw without its numbers of instances.
@@ -54,12 +57,4 @@ struct Template {
     first: u32,
     base_vertex: u32,
     padding: u32,
-}
-
-// Words of a plane that one workgroup of `emit_block` counts, as a power of two.
-const BLOCK_LOG2_WORDS: u32 = 10u;
-
-// The number of blocks of 1024 words.
-fn blocks_of(words: u32) -> u32 {
-    return (words + ((1u << BLOCK_LOG2_WORDS) - 1u)) >> BLOCK_LOG2_WORDS;
 }

@@ -1,5 +1,5 @@
 // The cut of bins: it clears the bits of a mask whose instances exceed the capacity of the list
-// (`emit.wgsl`): an invocation per word of the planes.
+// (`emit.wgsl`): an invocation per word of a set.
 // Then the mask says what is listed, and not what should have been.
 
 // Twin: `CUT_WORKGROUP` in `crates/hiz_core/src/output/cut.rs`.
@@ -11,9 +11,9 @@ override BY_INDEX: bool;
 override SORTED: bool;
 
 @group(0) @binding(0) var<uniform> emit: Emit;
-@group(0) @binding(1) var<storage, read> planes: array<u32>;
-@group(0) @binding(2) var<storage, read> before: array<u32>;
-@group(0) @binding(3) var<storage, read> blocks: array<u32>;
+@group(0) @binding(1) var<storage, read> planes: array<Numbers>;
+@group(0) @binding(2) var<storage, read> before: array<Packed>;
+@group(0) @binding(3) var<storage, read> blocks: array<Numbers>;
 @group(0) @binding(4) var<storage, read> totals: array<Total>;
 // The index of the instance in a slot, within the piece.
 @group(0) @binding(5) var<storage, read> index_of: array<u32>;
@@ -22,27 +22,29 @@ override SORTED: bool;
 @compute @workgroup_size(WORKGROUP)
 fn emit_cut(@builtin(global_invocation_id) id: vec3<u32>) {
     let w = id.x;
-    if w >= select(emit.lods, 1u, BY_INDEX) * emit.words {
+    let s = id.y;
+    if w >= emit.words {
         return;
     }
-    var bits = planes[w];
+    var bits_of_set = planes[s * emit.words + w];
     if BY_INDEX {
-        for (var l = 1u; l < emit.lods; l += 1u) {
-            bits |= planes[l * emit.words + w];
-        }
+        bits_of_set = of_first(in_any_set(w));
     }
-    let first_slot = WORD_BITS * (w % emit.words);
+    let ranks = blocks[block_at(s, w)] + unpack(before[s * emit.words + w]);
     let written = totals[emit.piece].written;
-    var rank = blocks[w >> BLOCK_LOG2_WORDS] + before[w];
-    while bits != 0u {
-        if rank >= written {
-            var index = first_slot + countTrailingZeros(bits);
-            if SORTED && !BY_INDEX {
-                index = index_of[index];
+    for (var p = 0u; p < PLANES; p += 1u) {
+        var bits = of_plane(bits_of_set, p);
+        var rank = of_plane(ranks, p);
+        while bits != 0u {
+            if rank >= written {
+                var index = WORD_BITS * w + countTrailingZeros(bits);
+                if SORTED && !BY_INDEX {
+                    index = index_of[index];
+                }
+                atomicAnd(&mask[index / WORD_BITS], ~(1u << (index % WORD_BITS)));
             }
-            atomicAnd(&mask[index / WORD_BITS], ~(1u << (index % WORD_BITS)));
+            bits &= bits - 1u;
+            rank += 1u;
         }
-        bits &= bits - 1u;
-        rank += 1u;
     }
 }

@@ -10,9 +10,9 @@ override SORTED: bool;
 override LIST: bool;
 
 @group(0) @binding(0) var<uniform> emit: Emit;
-@group(0) @binding(1) var<storage, read> planes: array<u32>;
-@group(0) @binding(2) var<storage, read> before: array<u32>;
-@group(0) @binding(3) var<storage, read> blocks: array<u32>;
+@group(0) @binding(1) var<storage, read> planes: array<Numbers>;
+@group(0) @binding(2) var<storage, read> before: array<Packed>;
+@group(0) @binding(3) var<storage, read> blocks: array<Numbers>;
 @group(0) @binding(4) var<storage, read> totals: array<Total>;
 // The mesh of an index, within the piece.
 @group(0) @binding(5) var<storage, read> mesh_of: array<u32>;
@@ -26,19 +26,17 @@ fn emit_instances(@builtin(global_invocation_id) id: vec3<u32>) {
     if w >= emit.words {
         return;
     }
-    var bits = 0u;
-    for (var l = 0u; l < emit.lods; l += 1u) {
-        bits |= planes[l * emit.words + w];
-    }
+    var bits = in_any_set(w);
     let written = totals[emit.piece].written;
-    var rank = blocks[w >> BLOCK_LOG2_WORDS] + before[w];
+    var rank = of_plane(blocks[block_at(0u, w)] + unpack(before[w]), 0u);
     while bits != 0u && rank < written {
         let lowest = bits & (~bits + 1u);
         let index = WORD_BITS * w + countTrailingZeros(bits);
         var lod = 0u;
-        for (var l = 1u; l < emit.lods; l += 1u) {
-            if (planes[l * emit.words + w] & lowest) != 0u {
-                lod = l;
+        for (var s = 0u; s < sets(); s += 1u) {
+            let bits_of_set = planes[s * emit.words + w];
+            if (in_any_plane(bits_of_set) & lowest) != 0u {
+                lod = s * PLANES + plane_with(bits_of_set, lowest);
             }
         }
         var mesh = 0u;

@@ -1,71 +1,50 @@
 // Counts the bits before each word of the planes (`emit.wgsl`).
 
-// Invocations of a workgroup, and words that each of them counts in `emit_block`.
-const LANES: u32 = 64u;
-const SHARE: u32 = (1u << BLOCK_LOG2_WORDS) / LANES;
+// Words that an invocation of `emit_block` counts.
+const SHARE: u32 = (1u << BLOCK_LOG2_WORDS) / WORKGROUP;
 
 // One list of all planes in the order of indices: an instance is kept if any plane has its bit.
+// Then the first set counts for all.
 // Otherwise the planes are counted one after the other.
 override BY_INDEX: bool;
 
 @group(0) @binding(0) var<uniform> emit: Emit;
-@group(0) @binding(1) var<storage, read> planes: array<u32>;
-// Bits before each word, within its block.
-@group(0) @binding(2) var<storage, read_write> before: array<u32>;
-// Bits before each block; one more word holds the number of all.
-@group(0) @binding(3) var<storage, read_write> blocks: array<u32>;
+@group(0) @binding(1) var<storage, read> planes: array<Numbers>;
+// Bits before each word, within its block of its plane.
+@group(0) @binding(2) var<storage, read_write> before: array<Packed>;
+// Bits before each block, in earlier planes, too.
+@group(0) @binding(3) var<storage, read_write> blocks: array<Numbers>;
 @group(0) @binding(4) var<storage, read_write> totals: array<Total>;
 @group(0) @binding(5) var<storage, read_write> draw_counts: array<u32>;
 
-var<workgroup> sums: array<u32, LANES>;
+alias Sum = Numbers;
 
-fn words() -> u32 {
-    return select(emit.lods, 1u, BY_INDEX) * emit.words;
-}
-
-fn bits(w: u32) -> u32 {
-    var word = planes[w];
-    if BY_INDEX {
-        for (var l = 1u; l < emit.lods; l += 1u) {
-            word |= planes[l * emit.words + w];
-        }
+fn ones(s: u32, w: u32) -> Numbers {
+    if !BY_INDEX {
+        return countOneBits(planes[s * emit.words + w]);
     }
-    return word;
+    return of_first(countOneBits(in_any_set(w)));
 }
 
-// The sum of `sum` over all lanes up to and including this one.
-// Source: Hillis and Steele, "Data Parallel Algorithms", 1986.
-fn prefix(lane: u32, sum: u32) -> u32 {
-    sums[lane] = sum;
-    workgroupBarrier();
-    for (var step = 1u; step < LANES; step *= 2u) {
-        var earlier = 0u;
-        if lane >= step { earlier = sums[lane - step]; }
-        workgroupBarrier();
-        sums[lane] += earlier;
-        workgroupBarrier();
-    }
-    return sums[lane];
-}
-
-@compute @workgroup_size(LANES)
+@compute @workgroup_size(WORKGROUP)
 fn emit_block(
     @builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32,
 ) {
-    let begin = min((workgroup.x << BLOCK_LOG2_WORDS) + lane * SHARE, words());
-    let end = min(begin + SHARE, words());
-    var sum = 0u;
+    let s = workgroup.y;
+    let begin = min((workgroup.x << BLOCK_LOG2_WORDS) + lane * SHARE, emit.words);
+    let end = min(begin + SHARE, emit.words);
+    var own = Numbers();
     for (var w = begin; w < end; w += 1u) {
-        sum += countOneBits(bits(w));
+        own += ones(s, w);
     }
-    let through = prefix(lane, sum);
-    var count = through - sum;
+    let through = prefix(lane, own);
+    var count = through - own;
     for (var w = begin; w < end; w += 1u) {
-        before[w] = count;
-        count += countOneBits(bits(w));
+        before[s * emit.words + w] = pack(count);
+        count += ones(s, w);
     }
-    if lane == LANES - 1u {
-        blocks[workgroup.x] = through;
+    if lane == WORKGROUP - 1u {
+        blocks[block_at(s, workgroup.x << BLOCK_LOG2_WORDS)] = through;
     }
 }
 
@@ -78,27 +57,38 @@ fn room() -> u32 {
     return left;
 }
 
-@compute @workgroup_size(LANES)
+@compute @workgroup_size(WORKGROUP)
 fn emit_top(@builtin(local_invocation_index) lane: u32) {
-    let count = blocks_of(words());
-    let share = (count + LANES - 1u) / LANES;
-    let begin = min(lane * share, count);
-    let end = min(begin + share, count);
-    var sum = 0u;
-    for (var b = begin; b < end; b += 1u) {
-        sum += blocks[b];
+    let share = (blocks_of_set() + WORKGROUP - 1u) / WORKGROUP;
+    let begin = min(lane * share, blocks_of_set());
+    let end = min(begin + share, blocks_of_set());
+    var kept = 0u;
+    for (var s = 0u; s < select(sets(), 1u, BY_INDEX); s += 1u) {
+        let first = block_at(s, 0u);
+        var own = Numbers();
+        for (var b = begin; b < end; b += 1u) {
+            own += blocks[first + b];
+        }
+        let through = prefix(lane, own);
+        let all = sums[WORKGROUP - 1u];
+        // All bits of earlier planes come first.
+        let earlier = Numbers(kept) + sum_before(all);
+        var count = earlier + through - own;
+        for (var b = begin; b < end; b += 1u) {
+            let here = blocks[first + b];
+            blocks[first + b] = count;
+            count += here;
+        }
+        if lane == 0u {
+            blocks[block_at(s, emit.words)] = earlier + all;
+        }
+        kept += sum(all);
+        // The next set takes the sums anew.
+        workgroupBarrier();
     }
-    let through = prefix(lane, sum);
-    var earlier = through - sum;
-    for (var b = begin; b < end; b += 1u) {
-        let here = blocks[b];
-        blocks[b] = earlier;
-        earlier += here;
-    }
-    if lane == LANES - 1u {
-        let written = min(through, room());
-        blocks[count] = through;
-        totals[emit.piece] = Total(through, written);
+    if lane == 0u {
+        let written = min(kept, room());
+        totals[emit.piece] = Total(kept, written);
         if BY_INDEX {
             draw_counts[emit.piece] = written;
         }

@@ -31,11 +31,7 @@ fn store_four(index: u32, texels: Ends4) {
 
 // Four pixels of a row as they were given.
 fn pixels_in_row(bits: vec4<u32>) -> Ends4 {
-    return Ends4(
-        vec4<u32>(sanitized(bits.x), sanitized(bits.y), sanitized(bits.z), sanitized(bits.w)),
-        vec4<u32>(
-            sanitized_near(bits.x), sanitized_near(bits.y),
-            sanitized_near(bits.z), sanitized_near(bits.w)));
+    return Ends4(sanitized4(bits), sanitized_near4(bits));
 }
 
 // The first, the second and the third texel that each of four halved ones takes of eight or nine.
@@ -54,9 +50,7 @@ fn thirds(left: Ends4, right: Ends4, ninth: Ends) -> Ends4 {
 }
 
 fn joined_rows(a: Ends4, b: Ends4) -> Ends4 {
-    return Ends4(
-        select(max(a.far, b.far), min(a.far, b.far), REVERSED),
-        select(min(a.near, b.near), max(a.near, b.near), REVERSED));
+    return Ends4(farthest_each(a.far, b.far), nearest_each(a.near, b.near));
 }
 
 // `joined` where a texel takes its third one, otherwise `pairs`.

@@ -24,7 +24,7 @@ fn store_four(index: u32, texels: Ends4) {
 
 // Four pixels of a row as they were given.
 fn pixels_in_row(bits: vec4<u32>) -> Ends4 {
-    return vec4<u32>(sanitized(bits.x), sanitized(bits.y), sanitized(bits.z), sanitized(bits.w));
+    return sanitized4(bits);
 }
 
 // The first, the second and the third texel that each of four halved ones takes of eight or nine.
@@ -41,7 +41,7 @@ fn thirds(left: Ends4, right: Ends4, ninth: Ends) -> Ends4 {
 }
 
 fn joined_rows(a: Ends4, b: Ends4) -> Ends4 {
-    return select(max(a, b), min(a, b), REVERSED);
+    return farthest_each(a, b);
 }
 
 // `joined` where a texel takes its third one, otherwise `pairs`.

@@ -3,11 +3,6 @@
 // It has no margins and no bars, and proves nothing.
 // It hides instances that can be seen, and exists to be measured against.
 
-// Options of the frame that it does not offer.
-override SAMPLE_COVERAGE: bool;
-override DESCENT: bool;
-override FIT_VOLUME: bool;
-
 struct Flat {
     center: f32,
     half: vec3<f32>,

@@ -483,6 +483,18 @@ TABLES: dict[str, Table] = {
                 )
             ],
             "levels": LEVELS,
+            "depths": DEPTHS,
+            "two_passes": FLAG,
+            "samples": [
+                (3, ValueError, "samples: expected one of (1, 2, 4, 8, 16), got 3"),
+                (0, ValueError, "expected an integer in 1..16, got int 0"),
+                (2.0, TypeError, "got float 2.0"),
+            ],
+            "views": [
+                (0, ValueError, "expected an integer in 1..256, got int 0"),
+                (257, ValueError, "got int 257"),
+                (True, TypeError, "got bool True"),
+            ],
             **OPTIONS,
             "pixel_budget": PIXEL_BUDGET,
             "capacity": CAPACITY,

@@ -5,6 +5,9 @@ import os
 import numpy as np
 
 import hizvk
+import hizvk.measuring.configuration
+import hizvk.measuring.spread
+import hizvk.recommendation
 
 from .shared import (
     BOUNDS,
@@ -38,6 +41,20 @@ from .shared import (
     rendered,
     spheres,
 )
+
+
+def several(device: hizvk.Device) -> hizvk.ViewsResult:
+    arguments = cull_arguments(device)
+    views = {name: [arguments.pop(name)] for name in ("camera", "pyramid")}
+    return device.cull(**views, **arguments)
+
+
+def recommendation() -> hizvk.Recommendation:
+    ms = hizvk.measuring.spread.spread(np.ones((1, 1)))
+    configuration = hizvk.measuring.configuration.Configuration()
+    best = hizvk.recommendation.Candidate(configuration, ms, ms, 1, True)
+    return hizvk.Recommendation(best, True, (best,), 1, "no adapter")
+
 
 TABLES: dict[str, Table] = {
     "CullOptions": Table(lambda _: (hizvk.CullOptions, {}), OPTIONS),
@@ -234,6 +251,10 @@ TABLES: dict[str, Table] = {
             ],
         },
     ),
+    "Recommendation.table": Table(
+        lambda _: (recommendation().table, {}),
+        {"most": [(0, ValueError, "got int 0"), ("all", TypeError, "got str 'all'")]},
+    ),
     "CullResult.hints": Table(lambda device: (device.cull(**cull_arguments(device)).hints, {}), {}),
     "CullResult.bin": Table(
         lambda device: (
@@ -257,6 +278,10 @@ TABLES: dict[str, Table] = {
     ),
     "CullResult.plot": Table(
         lambda device: (device.cull(**cull_arguments(device)).plot, {}), DRAWN
+    ),
+    "ViewsResult.plot": Table(
+        lambda device: (several(device).plot, {}),
+        {name: DRAWN[name] for name in ("bounds", "most", "unit")},
     ),
     "CullResult.save_html": Table(
         lambda device: (device.cull(**cull_arguments(device)).save_html, {"path": os.devnull}),
@@ -434,7 +459,7 @@ TABLES: dict[str, Table] = {
                 (
                     np.array([6, 1], dtype=np.uint8),
                     ValueError,
-                    "codes of hizvk.reference.unoccluded (5, 6, 3, 4), got 1",
+                    "codes of hizvk.reference.unoccluded (3, 4, 5, 6), got 1",
                 ),
                 (None, TypeError, "got None"),
             ],
@@ -453,6 +478,7 @@ TABLES: dict[str, Table] = {
             "kind": KIND,
             "scale": SCALE,
             "invalid": INVALID,
+            "tolerance": TOLERANCE,
             "coverage": COVERAGE,
             "own_depth": [
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),

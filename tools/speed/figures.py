@@ -232,7 +232,8 @@ class Found:
     @property
     def passed(self) -> bool:
         """Whether something was measured and no promise was broken; missed targets do not count."""
-        return bool(self.figures) and not self.broken()
+        rows = self.figures or self.first_calls or self.instance_counts or self.image_sizes
+        return bool(rows or self.whole_calls) and not self.broken()
 
     def as_data(self) -> dict[str, Any]:
         """Plain data for JSON."""

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Final
 
 from hizvk.commands import figure as figures
+
+from .figures import ImageSize, InstanceCount
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from .figures import Found
 
-__all__ = ["draw", "figure_of"]
+__all__ = ["draw", "draw_tables", "figure_of", "found_in", "mark_of"]
 
 #: A quantity that grows this much less than the size does not follow it and gets no dotted line.
 FOLLOWS: Final = 500.0
@@ -22,6 +26,63 @@ ALIKE: Final = 10.0
 def draw(path: Path, found: Found) -> None:
     """Writes `figure_of` the run as a PNG."""
     figure_of(found).savefig(path)
+
+
+def draw_tables(path: Path, text: str, adapter: str) -> None:
+    """Writes the same PNG from the two tables of a report's section "Scale".
+
+    Its text says of which tables it is (`mark_of`), so that a picture of other ones is noticed.
+    """
+    figure_of(found_in(text, adapter)).savefig(path, metadata={"Source": mark_of(text)})
+
+
+def found_in(text: str, adapter: str) -> Any:
+    """What `figure_of` reads of a run, from the two tables, as rounded as these are."""
+    counts, images = (
+        [[cell.strip().replace(",", "") for cell in line.strip("|").split("|")] for line in table]
+        for table in _tables(text)
+    )
+    return SimpleNamespace(
+        adapter=SimpleNamespace(name=adapter),
+        instance_counts=[_instance_count(row) for row in counts],
+        image_sizes=[_image_size(row) for row in images],
+    )
+
+
+def _instance_count(row: list[str]) -> InstanceCount:
+    instances = int(row[0])
+    upload, flat, groups, _, _, tests, texels, size = map(float, row[2:])
+    return InstanceCount(
+        instances, int(row[1]), upload, flat, groups,
+        device_bytes=round(size * instances), texels=texels, tests=round(tests * instances),
+    )  # fmt: skip
+
+
+def _image_size(row: list[str]) -> ImageSize:
+    side = int(row[0].partition("x")[0])
+    memcpy, reduce, _, groups, texels, size = map(float, row[1:])
+    return ImageSize(
+        side, memcpy, reduce, groups, device_bytes=round(size * side**2), texels=texels
+    )
+
+
+def mark_of(text: str) -> str:
+    """A number for the tables of a section."""
+    rows = "\n".join(line for table in _tables(text) for line in table)
+    return hashlib.sha256(rows.encode()).hexdigest()
+
+
+def _tables(text: str) -> list[list[str]]:
+    """The rows of each table, without head."""
+    found: list[list[str]] = []
+    before = ""
+    for line in text.splitlines():
+        if line.startswith("|") and not before.startswith("|"):
+            found.append([])
+        if line.startswith("|"):
+            found[-1].append(line)
+        before = line
+    return [table[2:] for table in found]
 
 
 def figure_of(found: Found) -> Any:

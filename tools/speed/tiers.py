@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from hizvk.bounds import Boxes
 from hizvk.scenes.scene import box_corners
 
 from .figures import Figure
@@ -30,6 +31,8 @@ __all__ = ["measure"]
 HIDDEN: Final = (0.95, 0.0)
 #: At most so much of the flat cull's time where nothing is hidden.
 NOTHING_HIDDEN: Final = 0.5
+#: By so many metres a crowd is lifted, so that no group touches the ground before its far side.
+LIFT: Final = 4.5
 #: At least so many times fewer depths are compared than pixels of all rectangles.
 FEWER: Final = 100.0
 #: Boxes that are projected at once.
@@ -41,6 +44,47 @@ def measure(run: Run) -> None:
     for hidden in HIDDEN:
         run.step(f"tiers of {run.extent.crowd:,} instances, about {100 * hidden:.0f} % hidden")
         _by_share(run, hidden)
+    run.step(f"tiers of {run.extent.crowd:,} instances above the ground")
+    _above_the_ground(run)
+
+
+def _above_the_ground(run: Run) -> None:
+    """Nothing is hidden, and nothing of the image is before the far side of a group.
+
+    On the ground a group's box has ground before it that is nearer than the box's far side.
+    So its depth cannot prove that all of the group shows, and its members are tested.
+    """
+    scene = run.town(run.extent.crowd, 0.0)
+    depth = run.depth(scene, run.extent.images[0][1])
+    one, both = run.device.pyramid(depth), run.device.pyramid(depth, depths="both")
+    lift = np.float32([0.0, 0.0, LIFT])
+    boxes = run.device.instances(Boxes(scene.low + lift, scene.high + lift))
+    ms = in_turns(
+        {
+            "flat": run.cull(boxes, depth.camera, one).ms,
+            "1 tier, both ends": run.cull(boxes, depth.camera, both, groups=True).ms,
+        },
+        run.extent.rounds,
+    )
+    name, key = "nothing hidden, above the ground", "tiers.above"
+    run.found.timed(f"tiers, {name}", ms)
+    run.found.ratio(
+        f"{key}.1 tier, both ends",
+        f"{name}: 1 tier, both ends / flat",
+        ms["1 tier, both ends"],
+        ms["flat"],
+        NOTHING_HIDDEN,
+    )
+    _accepted(run, boxes, both, (key, name))
+
+
+def _accepted(run: Run, boxes: Instances, pyramid: Pyramid, of: tuple[str, str]) -> None:
+    key, name = of
+    stats = run.device.cull(
+        boxes, pyramid.camera, pyramid, hierarchy=True, outputs=["verdicts"]
+    ).stats
+    share = stats.accepted_instances / stats.tested
+    run.found.number(f"{key}.accepted", f"{name}: accepted with their groups", share, "share")
 
 
 def _by_share(run: Run, hidden: float) -> None:
@@ -64,6 +108,7 @@ def _by_share(run: Run, hidden: float) -> None:
     for label in [*ways][1:]:
         target = NOTHING_HIDDEN if hidden == 0.0 and label == tiers[0] else None
         found.ratio(f"{key}.{label}", f"{name}: {label} / flat", ms[label], ms["flat"], target)
+    _accepted(run, boxes, both, (key, name))
     pixels = _pixels(scene, depth.camera)
     for label, pyramid in (("farthest end", one), ("both ends", both)):
         spent = _compared(run, boxes, pyramid)

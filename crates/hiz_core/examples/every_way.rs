@@ -6,8 +6,9 @@
 //!
 //! Three cameras look through a hall with a wall across it: two eyes and a mirror.
 //! Lights are spheres around what they reach, and particles are points.
-//! Shadow casters are boxes, tested by the camera of the sun, which a roof hides half of.
-//! One encoder draws four depth images, reduces them and culls everything.
+//! Shadow casters are boxes, half of whose shadows fall on what the first eye sees of the wall.
+//! The others stand behind the wall, as seen from that eye, and so do their shadows.
+//! One encoder draws three depth images, reduces them and culls everything.
 //! It copies all masks into one buffer, which is submitted, mapped and read once.
 //! `tests/examples.rs` runs this file, and knows the answers from where things stand.
 
@@ -15,12 +16,12 @@ use std::error::Error;
 
 use hiz_core::wgpu;
 use hiz_core::{
-    Bounds, Camera, CullOptions, DepthConvention, DrawOptions, Floats, HizContext, ImageSize,
-    InstanceOptions, Instances, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Outputs, Pose,
-    Projection, Pyramid, PyramidOptions, View, ViewsOutputs,
+    Bounds, Camera, CullOptions, DepthConvention, Depths, DirectionalLight, DrawOptions, Floats,
+    HizContext, ImageSize, InstanceOptions, Instances, MeshData, OCCLUDER_DEPTH_FORMAT,
+    OccluderOptions, Outputs, Pose, Projection, Pyramid, PyramidOptions, View, ViewsOutputs,
 };
 
-/// How many there are of each, half of them before the wall or beside the roof.
+/// How many there are of each, half of them before the wall.
 pub(crate) const LIGHTS: usize = 200;
 pub(crate) const PARTICLES: usize = 5000;
 pub(crate) const CASTERS: usize = 300;
@@ -36,7 +37,7 @@ pub(crate) struct Frame {
     /// By camera.
     pub(crate) lights: Vec<Vec<bool>>,
     pub(crate) particles: Vec<Vec<bool>>,
-    /// By the sun.
+    /// Whose shadows the first eye may see.
     pub(crate) casters: Vec<bool>,
 }
 
@@ -52,7 +53,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
             "camera {camera}: {lights} of {LIGHTS} lights, {particles} of {PARTICLES} particles"
         );
     }
-    println!("the sun: {} of {CASTERS} casters", kept(&frame.casters));
+    println!("the first eye: shadows of {} of {CASTERS} casters", kept(&frame.casters));
     println!("{} submission, {} readback", frame.submissions, frame.readbacks);
     Ok(())
 }
@@ -78,37 +79,20 @@ pub(crate) fn run(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Frame, B
         let projection = Projection::Perspective { fov_y: 1.2, near: 0.1, far: None, convention };
         Camera::look_at(&Pose { eye, target, up: [0.0, 1.0, 0.0] }, &projection, size)
     };
-    let sun = Projection::Orthographic {
-        left: -20.0,
-        right: 20.0,
-        bottom: -20.0,
-        top: 20.0,
-        near: 0.0,
-        far: 60.0,
-        convention,
-    };
-    let pose = Pose { eye: [0.0, 40.0, -20.0], target: [0.0, 0.0, -20.0], up: [0.0, 0.0, -1.0] };
-    let mut cameras = EYES.map(eye).into_iter().collect::<hiz_core::Result<Vec<_>>>()?;
-    cameras.push(Camera::look_at(&pose, &sun, size)?);
+    let cameras = EYES.map(eye).into_iter().collect::<hiz_core::Result<Vec<_>>>()?;
 
-    // The wall is 12 m away, and the roof 10 m high over all that has x < 0.
-    let quads = [
-        [[-60.0, -60.0, -12.0], [60.0, -60.0, -12.0], [60.0, 9.9, -12.0], [-60.0, 9.9, -12.0]],
-        [[-60.0, 10.0, -60.0], [0.0, 10.0, -60.0], [0.0, 10.0, 60.0], [-60.0, 10.0, 60.0]],
-    ];
-    let vertices: Vec<f32> = quads.into_iter().flatten().flatten().collect();
-    let triangles = [0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7];
-    let vertices = Floats::F32(&vertices);
-    let mesh = MeshData { vertices, triangles: &triangles, transforms: None };
+    // The wall is 12 m away, and the sun shines on it from behind the eyes.
+    let (low, high) = ([-60.0, -60.0, -12.0], [60.0, 20.0, -12.0]);
+    let vertices = [low, [high[0], low[1], low[2]], high, [low[0], high[1], low[2]]].concat();
+    let vertices = Floats::F64(&vertices);
+    let mesh = MeshData { vertices, triangles: &[0, 1, 2, 0, 2, 3], transforms: None };
+    let sun = DirectionalLight::new([0.0, -1.0, -1.0], low, high);
     let walls = hiz.create_occluders(&[mesh], &OccluderOptions::default())?;
 
     let behind = [[-2.0, 2.0], [-2.0, 2.0], [-30.0, -14.0]];
     let centers = places(LIGHTS, [[[-2.0, 2.0], [-1.0, 1.0], [-10.0, -6.0]], behind]);
     let points = places(PARTICLES, [[[-2.0, 2.0], [-1.0, 1.0], [-11.0, -5.0]], behind]);
-    let casters = places(
-        CASTERS,
-        [[[1.0, 18.0], [0.5, 5.0], [-35.0, -5.0]], [[-18.0, -1.0], [0.5, 5.0], [-35.0, -5.0]]],
-    );
+    let casters = places(CASTERS, [[[-2.0, 2.0], [0.5, 5.0], [-11.0, -7.0]], behind]);
     let [min, max] = [-0.4, 0.4].map(|d| casters.iter().map(|v| v + d).collect::<Vec<f32>>());
     let radii = [0.5; LIGHTS];
     let lights = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
@@ -132,6 +116,9 @@ pub(crate) fn run(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Frame, B
         .iter()
         .map(|_| hiz.create_pyramid(size, &PyramidOptions::default()))
         .collect::<hiz_core::Result<Vec<Pyramid>>>()?;
+    // Of what can receive shadows, the nearest depths count, too.
+    let of_receivers = PyramidOptions { depths: Depths::Receivers, ..PyramidOptions::default() };
+    let receivers = hiz.create_pyramid(size, &of_receivers)?;
 
     // A frame: depth of all cameras, all culls, and the copy of all answers.
     let mut frame = Frame::default();
@@ -141,16 +128,13 @@ pub(crate) fn run(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Frame, B
         hiz.record_occluders(&mut encoder, &walls, camera, depth, &DrawOptions::default())?;
         hiz.record_reduce(&mut encoder, depth, camera, pyramid)?;
     }
-    let views: Vec<_> = cameras
-        .iter()
-        .zip(&pyramids)
-        .take(EYES.len())
-        .map(|(camera, pyramid)| View { camera, pyramid })
-        .collect();
+    hiz.record_reduce(&mut encoder, &depths[0], &cameras[0], &receivers)?;
+    let views: Vec<_> =
+        cameras.iter().zip(&pyramids).map(|(camera, pyramid)| View { camera, pyramid }).collect();
     hiz.record_cull_views(&mut encoder, &lights, &views, None, &seen_lights, &options)?;
     hiz.record_cull_views(&mut encoder, &points, &views, None, &seen_points, &options)?;
-    let [.., sun] = &cameras[..] else { unreachable!("the sun's camera is the last") };
-    hiz.record_cull(&mut encoder, &casters, sun, &pyramids[EYES.len()], &lit, &options)?;
+    let shadows = CullOptions { shadow: Some(sun), ..options.clone() };
+    hiz.record_cull(&mut encoder, &casters, &cameras[0], &receivers, &lit, &shadows)?;
     let answers =
         [seen_lights.masks(), seen_points.masks(), lit.mask(0).expect("a mask was asked for")];
     let staging = device.create_buffer(&wgpu::BufferDescriptor {

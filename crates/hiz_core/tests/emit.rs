@@ -382,6 +382,18 @@ fn empty_meshes_have_no_draws() {
     }
 }
 
+/// More meshes than the invocations of a workgroup of the draws have workgroups to add up.
+#[test]
+fn draws_of_many_meshes_stand_together() {
+    let world = World::new(&[]);
+    let lods = vec![1; 33_000];
+    let mesh = |i: u32| [0, 511, 512, 600, 32_767, 32_768, 32_999][i as usize % 7];
+    let made = |i| Made { mesh: mesh(i), lod: 0, shows: i % 3 > 0 };
+    let crowd = Crowd::new(&world, (0..40).map(made).collect(), None, true);
+    let emit = emits(&world.table(&lods, true))[0].clone();
+    check(&world, &crowd, &lods, &emit, None, true).unwrap();
+}
+
 /// Without mesh ids and scales all have mesh 0, and their slots are their indices.
 #[test]
 fn instances_without_ids_have_mesh_0() {
@@ -720,7 +732,7 @@ fn packed_bins_need_first_instances() {
 #[test]
 fn planted_faults_are_seen() {
     for (what, by, name, way) in [
-        ("rank(lod, starts[mesh])", "rank(lod, starts[mesh] + 1u)", "starts off by one", 0),
+        ("ranks(s, starts[share.x])", "ranks(s, starts[share.x] + 1u)", "starts off by one", 0),
         (
             "starts[mesh + 1u]), written)",
             "starts[mesh + 1u] + 1u), written)",
@@ -728,25 +740,32 @@ fn planted_faults_are_seen() {
             0,
         ),
         (
-            "return blocks[w >> BLOCK_LOG2_WORDS] + before[w]",
-            "return before[w]",
-            "a rank without its block",
+            "let through_block = blocks[block_at(s, w)];",
+            "let through_block = Numbers();",
+            "a rank",
             0,
         ),
         (
-            "blocks[at >> BLOCK_LOG2_WORDS] + before[at]);",
-            "before[at]);",
+            "unpack(before[at]) + blocks[block_at(s, workgroup.x * WORKGROUP)]",
+            "unpack(before[at])",
             "a scatter without its block",
             0,
         ),
+        ("packed >> vec2<u32>(COUNT_BITS)", "packed", "the counts of two planes", 0),
+        ("earlier = Numbers(kept) +", "earlier =", "what earlier sets keep", 0),
+        ("+ sum_before(all)", "", "what earlier planes keep", 0),
         ("if rank < written {", "if true {", "a list past its capacity", 0),
-        ("min(through, room())", "min(through, emit.capacity)", "the capacity that is left", 0),
+        ("min(kept, room())", "min(kept, emit.capacity)", "the capacity that is left", 0),
         ("index = index_of[index];", "", "slots as indices", 0),
-        ("bin.lod * piece.words + at.word", "at.word", "the plane", 0),
-        ("high.ranks += high_ones;", "", "the ranks of the last planes", 0),
-        ("write_draw(empty, Template(), 0u, 0u);", "", "the tail of the draws", 0),
+        ("bin.lod / PLANES * piece.words + at.word", "at.word", "the set", 0),
+        ("word_of_set * PLANES + bin.lod % PLANES", "word_of_set * PLANES", "the plane", 0),
+        ("*ranks += select(Numbers(0u), Numbers(1u), has);", "", "the ranks of a plane", 0),
+        ("*ranks += 1u;", "", "the ranks of the one plane", 0),
+        ("at += filled_through(min(id.x - 1u, last));", "", "the draws of earlier shares", 0),
+        ("select(0u, filled, w < workgroup.x)", "0u", "the draws of earlier workgroups", 0),
+        ("write_draw(bin, Template(), 0u, 0u);", "", "the tail of the draws", 0),
         (
-            "draw_counts[emit.piece] = count;",
+            "draw_counts[emit.piece] = all.y;",
             "draw_counts[emit.piece] = emit.records;",
             "the number of draws",
             0,
@@ -757,20 +776,22 @@ fn planted_faults_are_seen() {
             "the shift of a bin",
             1,
         ),
-        ("NUMBERS + FOUR", "NUMBERS", "a level of the last planes", 1),
-        ("lod = l;", "", "a draw of another level", 2),
+        ("s * PLANES + plane_with(bits, bit)", "plane_with(bits, bit)", "a level of a set", 1),
+        ("lod = s * PLANES + plane_with(bits_of_set, lowest);", "", "a draw of another level", 2),
     ] {
         let world = World::new(&[(what, by)]);
-        let mut random = Random(4);
-        let lods = [6, 3, 1];
-        // Two pieces, of which the first has more than one block of words.
-        let made = Crowd::random(40_000, &lods, 0.9, 0.1, &mut random);
-        let crowd = Crowd::new(&world, made, Some(36_864), true);
-        let emit = emits(&world.table(&lods, true))[way].clone();
-        let kept = crowd.made.iter().filter(|m| m.is_kept()).count() as u32;
-        let seen = [None, Some(kept - 10), Some(kept / 2)]
-            .into_iter()
-            .any(|capacity| check(&world, &crowd, &lods, &emit, capacity, true).is_err());
+        // Two pieces, of which the first has more than one block of words; one plane; and draws of
+        // several workgroups.
+        let crowds = [(vec![6, 3, 1], 40_000), (vec![1; 3], 3000), (vec![1; 600], 1000)];
+        let seen = crowds.into_iter().any(|(lods, n)| {
+            let made = Crowd::random(n, &lods, 0.9, 0.1, &mut Random(4));
+            let crowd = Crowd::new(&world, made, Some(36_864), true);
+            let emit = emits(&world.table(&lods, true))[way].clone();
+            let kept = crowd.made.iter().filter(|m| m.is_kept()).count() as u32;
+            [None, Some(kept - 10), Some(kept / 2)]
+                .into_iter()
+                .any(|capacity| check(&world, &crowd, &lods, &emit, capacity, true).is_err())
+        });
         assert!(seen, "{name}: nothing shows it");
     }
 }

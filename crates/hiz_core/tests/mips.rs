@@ -339,7 +339,7 @@ fn planted_faults_change_levels() {
         ("vec4<u32>(left.z, right.x, right.z, ninth)", "vec4<u32>(left.z, right.xz, right.w)"),
         ("column <= last.x;", "column <= last.x - u32(third.x && row == first.y + 2u);"),
         ("return select(sanitized(bits), near_bits(), outside);", "return sanitized(bits);"),
-        ("min(a.near, b.near), max(a.near, b.near)", "a.near, a.near"),
+        ("nearest_each(a.near, b.near)", "a.near"),
         ("let bottom = halved(c, d);", "let bottom = halved(c, c);"),
         ("let y = step.first + row;", "let y = row;"),
     ];

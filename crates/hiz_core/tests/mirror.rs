@@ -9,7 +9,7 @@ mod campaign;
 #[path = "common/mirror/mod.rs"]
 mod mirror;
 
-use campaign::{Campaign, Class, Round, moved};
+use campaign::{Campaign, Class, POINTS, Round, moved};
 use common::{Random, engine};
 use hiz_core::{
     BoundsKind, Camera, Coverage, DepthConvention, ERROR_ULPS, Footprint, ImageSize, Pose,
@@ -180,6 +180,50 @@ fn to_nearest_it_agrees_with_the_device() {
     let least = differences.map(|d| d[0] + d[1]).into_iter().min().expect("two");
     assert!(least <= allowed, "the device computes something else");
     assert!(culled > cases / 10, "few culls prove little");
+}
+
+/// Points of both widths, whose records have no low half or no size.
+///
+/// To nearest the mirror agrees with the device; in every other arithmetic nothing that shows is
+/// culled.
+/// With a 24th of the margin something is, so the campaign is sharp.
+#[test]
+fn points_in_every_arithmetic() {
+    let campaign = |seed, rounds, coverage| Campaign {
+        seed,
+        rounds,
+        coverage,
+        kinds: &POINTS,
+        modes: FOOTPRINTS,
+        ..Campaign::default()
+    };
+    let (mut cases, mut culled) = (0, 0);
+    let mut differences = [0; 2];
+    for round in campaign(51, 3, Coverage::Area).rounds() {
+        let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(&engine())) else {
+            continue;
+        };
+        cases += device.iter().map(Vec::len).sum::<usize>();
+        culled += device.iter().flatten().filter(|kept| !**kept).count();
+        for (style, count) in [STYLES[0], MARGIN_FIRST].iter().zip(&mut differences) {
+            let masks = mirror.masks(ERROR_ULPS as f32, &mut Arithmetic::new(*style, 0));
+            let both = masks.iter().flatten().zip(device.iter().flatten());
+            *count += both.filter(|(ours, theirs)| ours != theirs).count();
+        }
+    }
+    eprintln!("points: {cases} cases, {culled} culled, {differences:?} differ from the device");
+    let plain = ["llvmpipe", "SwiftShader"]
+        .iter()
+        .any(|name| engine().adapter().to_string().contains(name));
+    let allowed = if plain { 0 } else { cases / 20 };
+    assert!(differences[0].min(differences[1]) <= allowed && culled > cases / 10);
+    for (seed, coverage) in [(52, Coverage::Area), (53, Coverage::Sample)] {
+        let margins = [ERROR_ULPS as f32, 1.0, 0.0];
+        let power = Power::of_campaign(&margins, &STYLES, campaign(seed, 12, coverage));
+        eprintln!("{coverage:?}\n{power}");
+        assert_eq!(power.total(0), 0);
+        assert!(coverage == Coverage::Sample || power.total(2) > 0, "no margin, and green");
+    }
 }
 
 #[test]

@@ -3,13 +3,14 @@
 mod common;
 
 use common::{Random, camera_along_z, depth_descriptor, engine};
-use hiz_core::headless::Engine;
+use hiz_core::headless::{CullExtras, EarlyMask, Engine, MoreWarmUp};
 use hiz_core::testing::Made;
 use hiz_core::{
-    AtlasUse, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, EarlySet,
-    FaceCull, Fit, Floats, Footprint, Hierarchy, HizContext, ImageSize, InstanceOptions, Instances,
-    MeshData, OccluderOptions, Order, Outputs, PyramidOptions, ResolveOptions, StoredLevels, View,
-    ViewsOutputs, WarmUp, WarmUpMore, wgpu,
+    AtlasUse, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, DepthInput,
+    DepthKind, DepthTolerance, Depths, EarlySet, FaceCull, Fit, Floats, Footprint, Hierarchy,
+    HizContext, ImageSize, InstanceOptions, Instances, MeshData, OccluderOptions, Order, Outputs,
+    PyramidOptions, ResolveOptions, StoredLevels, View, ViewsOutputs, WarmUp, WarmUpMore,
+    WorldTolerance, wgpu,
 };
 
 const COUNT: usize = 300;
@@ -340,7 +341,15 @@ fn the_first_frame_of_an_engine_makes_no_pipeline() {
         let levels = PyramidOptions { levels: kind.levels, ..PyramidOptions::default() };
         let camera = camera(&kind);
         engine
-            .warm_up(&instances, &camera, occluders, &levels, &kind.options, &kind.outputs)
+            .warm_up(
+                &instances,
+                &camera,
+                occluders,
+                &levels,
+                &kind.options,
+                &kind.outputs,
+                &MoreWarmUp::default(),
+            )
             .unwrap();
         let before = engine.context().made();
         let depth = match occluders {
@@ -362,4 +371,77 @@ fn the_first_frame_of_an_engine_makes_no_pipeline() {
         assert_eq!(engine.context().made().pipelines, before.pipelines, "{kind:?}");
         assert!(culling.timings().compile_ms == 0.0, "{kind:?}");
     }
+}
+
+/// Two passes, several views and several samples, with one end of the pyramid and with both.
+#[test]
+fn the_first_frame_of_an_engine_with_more_passes_makes_no_pipeline() {
+    let crowd = Crowd::new();
+    for (k, kind) in kinds(3).into_iter().enumerate() {
+        let engine = Engine::new(None).unwrap();
+        let instances =
+            engine.instances(&crowd.bounds(kind.bounds), &InstanceOptions::default()).unwrap();
+        let depths = if k % 2 == 0 { Depths::Both } else { Depths::Farthest };
+        let levels = PyramidOptions { levels: kind.levels, depths, ..PyramidOptions::default() };
+        let coverage = Coverage::Area;
+        let options = CullOptions { order: Order::Stable, coverage, ..kind.options.clone() };
+        let outputs = Outputs { capacity: None, ..kind.outputs.clone() };
+        let more = MoreWarmUp { two_passes: true, samples: 2, views: 3 };
+        let camera = camera(&kind);
+        engine.warm_up(&instances, &camera, None, &levels, &options, &outputs, &more).unwrap();
+        let before = engine.context().made().pipelines;
+
+        let image = vec![0.5; camera.size().pixels() as usize];
+        let own =
+            if camera.convention().is_reversed() { DepthKind::ReversedNdc } else { DepthKind::Ndc };
+        let sample = DepthInput {
+            numbers: Floats::F32(&image).into(),
+            kind: own,
+            scale: 1.0,
+            invalid: &[],
+            tolerance: DepthTolerance::NONE,
+            world_tolerance: WorldTolerance::NONE,
+        };
+        let depth = engine.upload_samples_for(&[sample, sample], &camera, depths).unwrap();
+        let pyramid = engine.pyramid_with(&depth, &levels).unwrap();
+        for capacity in [None, Some(7)] {
+            let passes = engine.two_passes(&instances, capacity).unwrap();
+            let some: Vec<bool> = (0..COUNT).map(|i| i % 3 == 0).collect();
+            for set in
+                [EarlyMask::LastVisible, EarlyMask::Largest { pixels: 9 }, EarlyMask::Given(&some)]
+            {
+                passes.early(&camera, set).unwrap().mask().unwrap();
+            }
+            passes.late(&camera, &pyramid, &options).unwrap().mask().unwrap();
+            passes.early(&camera, EarlyMask::LastVisible).unwrap().mask().unwrap();
+        }
+        let each = Outputs { mask: true, verdicts: outputs.verdicts, ..Outputs::NONE };
+        let outputs = ViewsOutputs { each, any: outputs };
+        let views = [(&camera, &pyramid); 3];
+        let extras = CullExtras::default();
+        let seen = engine.cull_views(&instances, &views, &options, &outputs, &extras).unwrap();
+        seen.masks().unwrap();
+        assert_eq!(engine.context().made().pipelines, before, "{kind:?}");
+    }
+}
+
+/// Without them the same frame makes pipelines, so the test above tells.
+#[test]
+fn a_plain_warm_up_does_not_know_two_passes() {
+    let (engine, crowd) = (Engine::new(None).unwrap(), Crowd::new());
+    let bounds = crowd.bounds(BoundsKind::Sphere);
+    let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+    let camera = camera_along_z(64, 48, DepthConvention::Reversed);
+    let (levels, options) = (PyramidOptions::default(), CullOptions::default());
+    let (outputs, plain) = (Outputs::default(), MoreWarmUp::default());
+    engine.warm_up(&instances, &camera, None, &levels, &options, &outputs, &plain).unwrap();
+    let before = engine.context().made().pipelines;
+    let passes = engine.two_passes(&instances, None).unwrap();
+    passes.early(&camera, EarlyMask::LastVisible).unwrap();
+    assert!(engine.context().made().pipelines > before);
+    let samples = MoreWarmUp { samples: 2, ..plain };
+    let walls = engine.occluders(&[WALL], &OccluderOptions::default()).unwrap();
+    let drawn = Some(&*walls);
+    let refused = engine.warm_up(&instances, &camera, drawn, &levels, &options, &outputs, &samples);
+    assert!(refused.unwrap_err().to_string().starts_with("samples: expected 1"));
 }

@@ -471,7 +471,8 @@ impl Engine {
         self.0.run(py, cull).map(|culling| ViewsCulling(Held::new(py, culling)))
     }
 
-    /// As `cull`; `occluders` says where depth comes from, and `levels` what is stored.
+    /// As `cull`; `occluders` says where depth comes from, and `stored` which levels and depths are.
+    /// `more`: whether there are two passes, then samples per pixel and views.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn warm_up(
         &self,
@@ -479,20 +480,24 @@ impl Engine {
         instances: &Instances,
         camera: &Camera,
         occluders: Option<&Occluders>,
-        levels: (u32, u32),
+        stored: ((u32, u32), String),
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
         meshes: Option<&MeshTable>,
+        more: (bool, u32, u32),
     ) -> PyResult<()> {
         let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
         let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let instances = instances.0.get(py)?;
         let occluders = occluders.map(|occluders| occluders.0.get(py)).transpose()?;
-        let levels = StoredLevels { first: levels.0, last: levels.1 };
-        let levels = PyramidOptions { levels, ..PyramidOptions::default() };
+        let ((first, last), depths) = stored;
+        let (levels, depths) = (StoredLevels { first, last }, depths_of(&depths)?);
+        let levels = PyramidOptions { levels, depths, ..PyramidOptions::default() };
+        let (two_passes, samples, views) = more;
+        let more = headless::MoreWarmUp { two_passes, samples, views };
         self.0.run(py, |engine| {
             let occluders = occluders.as_deref().map(Arc::as_ref);
-            engine.warm_up(&instances, &camera.0, occluders, &levels, &options, &outputs)
+            engine.warm_up(&instances, &camera.0, occluders, &levels, &options, &outputs, &more)
         })
     }
 

@@ -90,6 +90,7 @@ pub(crate) fn reference_classify<'py>(
     invalid: Vec<f64>,
     coverage: &str,
     own_depth: &str,
+    tolerance: (f64, f64),
 ) -> PyResult<Bound<'py, PyArray1<u8>>> {
     let volumes = bounds(bounds_kind, &arrays)?;
     let (image, depth_kind) = (image.floats()?, self::depth_kind(depth_kind)?);
@@ -110,7 +111,9 @@ pub(crate) fn reference_classify<'py>(
     let depth = py
         .detach(|| {
             let numbers: Vec<f64> = (0..image.len()).map(|i| image.get(i)).collect();
-            hiz_ref::depth_bounds(&view, &numbers, meaning)
+            let (relative, absolute) = tolerance;
+            let tolerance = hiz_ref::Tolerance { relative, absolute };
+            hiz_ref::moved_depth_bounds(&view, &numbers, meaning, tolerance)
         })
         .map_err(refused)?;
     codes(py, count, |i| {

@@ -44,6 +44,11 @@ impl Yardstick {
         self.0.run(py, yardstick::empty_submit_ms)
     }
 
+    /// How many pipelines the device has made so far.
+    fn pipelines_made(&self, py: Python<'_>) -> PyResult<u64> {
+        self.0.run(py, |engine| Ok::<_, Error>(yardstick::pipelines_made(engine)))
+    }
+
     /// Milliseconds of a copy by one thread of the host.
     #[staticmethod]
     #[expect(clippy::needless_pass_by_value, reason = "the arrays are held during the call")]

@@ -9,6 +9,10 @@
 //! Float64 with an error bound finds the two float32 around the depth.
 //! If the bound leaves more than two, exact arithmetic decides.
 
+mod moved;
+
+pub use moved::Tolerance;
+
 use crate::Error;
 use crate::dyadic::Dyadic;
 use crate::pyramid::{LEAST_NORMAL, ONE};
@@ -80,8 +84,30 @@ pub fn depth_bounds(
     image: &[f64],
     meaning: DepthMeaning,
 ) -> Result<DepthBounds, Error> {
+    moved_depth_bounds(view, image, meaning, Tolerance::NONE)
+}
+
+/// [`depth_bounds`] of an image whose depths are moved away from the eye by `tolerance`.
+///
+/// - A number of kind `Z` or `Distance` is moved as it stands.
+/// - NDC depth is moved along the view, by the view depth that it stands for.
+/// - "No data" and the far plane stay what they are.
+/// - A number in front of the near plane is no data, however far it would be moved.
+///
+/// # Errors
+///
+/// Those of [`depth_bounds`], and [`Error::DepthMeaning`] for
+///
+/// - a tolerance that is negative or not finite;
+/// - a tolerance of NDC depth, if the view is singular or does not say where view depth starts.
+pub fn moved_depth_bounds(
+    view: &View,
+    image: &[f64],
+    meaning: DepthMeaning,
+    tolerance: Tolerance,
+) -> Result<DepthBounds, Error> {
     let far = if view.reversed { 0.0 } else { 1.0 };
-    let ends = around_pixels(view, image, meaning)?.into_iter().map(|at| match at {
+    let ends = around_pixels(view, image, meaning, tolerance)?.into_iter().map(|at| match at {
         Pixel::Between(ends) => ends,
         Pixel::Beyond | Pixel::NoData => [far; 2],
     });
@@ -105,11 +131,12 @@ pub fn nearest_depth_bounds(
     meaning: DepthMeaning,
 ) -> Result<DepthBounds, Error> {
     let (near, far) = if view.reversed { (1.0, 0.0) } else { (0.0, 1.0) };
-    let ends = around_pixels(view, image, meaning)?.into_iter().map(|at| match at {
-        Pixel::Between(ends) => ends,
-        Pixel::Beyond => [far; 2],
-        Pixel::NoData => [near; 2],
-    });
+    let ends =
+        around_pixels(view, image, meaning, Tolerance::NONE)?.into_iter().map(|at| match at {
+            Pixel::Between(ends) => ends,
+            Pixel::Beyond => [far; 2],
+            Pixel::NoData => [near; 2],
+        });
     let (nearer, farther) = ends.map(|[nearer, farther]| (nearer, farther)).unzip();
     Ok(DepthBounds { nearer, farther })
 }
@@ -125,8 +152,14 @@ enum Pixel {
 }
 
 /// What each pixel of an image holds.
-fn around_pixels(view: &View, image: &[f64], meaning: DepthMeaning) -> Result<Vec<Pixel>, Error> {
+fn around_pixels(
+    view: &View,
+    image: &[f64],
+    meaning: DepthMeaning,
+    tolerance: Tolerance,
+) -> Result<Vec<Pixel>, Error> {
     view.check()?;
+    tolerance.check()?;
     view.check_length(image.len())?;
     let DepthMeaning { kind, scale, invalid, origin_is_eye } = meaning;
     let mut ends = Vec::with_capacity(image.len());
@@ -139,13 +172,15 @@ fn around_pixels(view: &View, image: &[f64], meaning: DepthMeaning) -> Result<Ve
             "scale: expected a positive finite number, 1 for NDC depth",
         ));
     }
-    if metric && !origin_is_eye && view.rows[3][..3] == [0.0; 3] {
+    let is_moved = tolerance != Tolerance::NONE;
+    if (metric || is_moved) && !origin_is_eye && view.rows[3][..3] == [0.0; 3] {
         return Err(Error::DepthMeaning(
-            "kind: expected NDC depth for a parallel projection that does not say where view depth \
-             starts",
+            "kind: expected NDC depth without a tolerance for a parallel projection that does not \
+             say where view depth starts",
         ));
     }
-    let rays = if metric { Some(Rays::new(view, kind)?) } else { None };
+    let rays = if metric || is_moved { Some(Rays::new(view, kind)?) } else { None };
+    let far = if view.reversed { 0.0 } else { 1.0 };
     let mut pixels = image.iter();
     for row in 0..view.height {
         for column in 0..view.width {
@@ -153,16 +188,26 @@ fn around_pixels(view: &View, image: &[f64], meaning: DepthMeaning) -> Result<Ve
             let beyond = if view.reversed { Ordering::Less } else { Ordering::Greater };
             let around = match &rays {
                 _ if invalid.contains(&number) => Err(Ordering::Equal),
-                Some(_) if number == f64::INFINITY => Err(beyond),
+                Some(_) if metric && number == f64::INFINITY => Err(beyond),
                 _ if !number.is_finite() => Err(Ordering::Equal),
-                None => bracket(number, number, |f| {
+                Some(rays) if !metric && number != far && (0.0..=1.0).contains(&number) => {
+                    match rays.around_ndc([column, row], number, tolerance) {
+                        // Beyond the far plane.
+                        Err(_) => Ok([far as f32; 2]),
+                        moved => moved,
+                    }
+                }
+                _ if !metric => bracket(number, number, |f| {
                     number.partial_cmp(&f64::from(f)).expect("a finite number")
                 })
                 .map_err(|_| Ordering::Equal),
                 Some(rays) if number > 0.0 || rays.signed => {
-                    rays.around([column, row], number, scale)
+                    match rays.around([column, row], (number, scale), Tolerance::NONE) {
+                        Ok(_) if is_moved => rays.around([column, row], (number, scale), tolerance),
+                        given => given,
+                    }
                 }
-                Some(_) => Err(Ordering::Equal),
+                _ => Err(Ordering::Equal),
             };
             ends.push(match around {
                 Ok([low, high]) if view.reversed => Pixel::Between([high, low]),
@@ -203,14 +248,19 @@ impl<'a> Rays<'a> {
         Ok(Rays { view, kind, signed, float, exact })
     }
 
-    /// The two float32 next to the depth of `number * scale` in a pixel.
+    /// The two float32 next to the depth of a number times its scale in a pixel.
     /// If the depth is outside `0..=1`, on which side.
-    fn around(&self, pixel: [u32; 2], number: f64, scale: f64) -> Result<[f32; 2], Ordering> {
-        let quick = self.float.depth(self.view, self.kind, pixel, number, scale).rounded();
+    fn around(
+        &self,
+        pixel: [u32; 2],
+        number: (f64, f64),
+        tolerance: Tolerance,
+    ) -> Result<[f32; 2], Ordering> {
+        let quick = self.float.depth(self.view, self.kind, pixel, number, tolerance).rounded();
         let exact = OnceCell::new();
         bracket(quick.mid - quick.err(), quick.mid + quick.err(), |f| {
             exact
-                .get_or_init(|| self.exact.depth(self.view, self.kind, pixel, number, scale))
+                .get_or_init(|| self.exact.depth(self.view, self.kind, pixel, number, tolerance))
                 .compare(f)
         })
     }
@@ -374,29 +424,36 @@ impl<S: Scalar> Geometry<S> {
         }
     }
 
-    /// The NDC depth at which `number * scale` lies in a pixel.
-    fn depth(
-        &self,
-        view: &View,
-        kind: DepthKind,
-        [column, row]: [u32; 2],
-        number: f64,
-        scale: f64,
-    ) -> Root<S> {
+    /// The number of pixels, and the ray of a pixel.
+    ///
+    /// Perspective: the ray along which w grows by 1, times determinant and area.
+    /// Parallel: the pixel's position relative to that of x = y = 0, with the same factor.
+    fn ray(&self, view: &View, [column, row]: [u32; 2]) -> (S, Vector<S>) {
         let (width, height) = (f64::from(view.width), f64::from(view.height));
         // The pixel's centre in NDC, times width and height, which makes whole numbers.
         let area = S::exact(width * height);
         let x = S::exact((2.0 * f64::from(column) + 1.0 - width) * height);
         let y = S::exact((height - 1.0 - 2.0 * f64::from(row)) * width);
-        let value = S::exact(number).times(&S::exact(scale));
         let at = |k: usize| {
             let [a, b, c] = [0, 1, 2].map(|j| &self.adjugate[j][k]);
             let sum = a.times(&x).plus(&b.times(&y));
             if self.parallel { sum } else { sum.plus(&c.times(&area)) }
         };
-        // Perspective: the ray along which w grows by 1, times determinant and area.
-        // Parallel: the pixel's position relative to that of x = y = 0, with the same factor.
         let ray = [at(0), at(1), at(2)];
+        (area, ray)
+    }
+
+    /// The NDC depth at which a number times its scale lies in a pixel, moved by a tolerance.
+    fn depth(
+        &self,
+        view: &View,
+        kind: DepthKind,
+        pixel: [u32; 2],
+        (number, scale): (f64, f64),
+        tolerance: Tolerance,
+    ) -> Root<S> {
+        let (area, ray) = self.ray(view, pixel);
+        let value = tolerance.moved(S::exact(number).times(&S::exact(scale)));
         if self.parallel {
             // z = (constant + w z.ray / area) / determinant + along value / |direction|.
             // |direction|^2 is the determinant.

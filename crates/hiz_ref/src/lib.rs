@@ -30,6 +30,7 @@
 //! - [`depth_bounds`] converts an image that does not hold NDC depth.
 //!   Its result is NDC depth between two float32 per pixel, and [`classify_between`] judges by such
 //!   an image.
+//!   [`moved_depth_bounds`] does the same for an image that may be off by a tolerance.
 //! - [`pyramid()`] is the reference of the depth pyramid; it computes each texel from all of its
 //!   pixels.
 //! - [`check_proxy`] says whether an occluder proxy lies inside its mesh.
@@ -96,7 +97,10 @@ mod view;
 mod volume;
 
 pub use containment::{MeshError, Protrusion, TriangleMesh, check_bounds, check_proxy, contains};
-pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds, nearest_depth_bounds};
+pub use depth::{
+    DepthBounds, DepthKind, DepthMeaning, Tolerance, depth_bounds, moved_depth_bounds,
+    nearest_depth_bounds,
+};
 pub use lod::{LodRule, coarsest_lod, greatest_stretch, least_w, pixel_shift, radius, stretch_at};
 pub use pixels::{PixelTruth, pixel_truth};
 pub use pyramid::{Level, pyramid, sanitized_depth};

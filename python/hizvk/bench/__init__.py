@@ -1,6 +1,7 @@
 """``hizvk bench``: what culling costs and what it leaves, on scenes with known truth.
 
 - `command`: the command line
+- `frame`: what the reports share: options, run, what a page begins with
 - `catalogue`: the scenes; `volumes` has the bounds of their instances
 - `configurations`: what is compared
 - `measure`: times and counts

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
+from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
 import hizvk
@@ -14,19 +14,28 @@ from ..commands import arguments as args
 from ..commands import figure
 from ..progress import Progress
 from ..scenes import embree
-from . import catalogue, configurations, whole_way
+from . import catalogue, configurations, frame, whole_way
 from .measure import measure
 from .report import Report
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
+    from pathlib import Path
 
     from .._arguments import Size
 
 __all__ = ["Extent", "main", "run"]
 
 PROG: Final = "hizvk bench"
+#: Reports of their own: option and module, and what each is about.
+REPORTS: Final = {
+    "occluders": "what is lost with fewer or simpler occluders",
+    "maps": "hierarchical occlusion maps beside the cull",
+    "tiling": "coverage bits in BSP order beside depth tiles",
+    "shadows": "shadow casters that are needed, and that a cull keeps",
+    "texts": "what published tests lose, and their time",
+}
 
 
 @dataclass(frozen=True)
@@ -160,33 +169,11 @@ def _parser() -> argparse.ArgumentParser:
     args.add_extent(
         parser, quick="small scenes, few rows", full="all combinations; long", seeded="the scenes"
     )
-    parser.add_argument(
-        "--castle",
-        type=Path,
-        metavar="PATH",
-        help=f"castle.npz (or the variable {catalogue.VARIABLE})",
-    )
-    parser.add_argument(
-        "--occluders",
-        action="store_true",
-        help="instead: what is lost with fewer or simpler occluders; --occluders --help tells more",
-    )
-    parser.add_argument(
-        "--maps",
-        action="store_true",
-        help="instead: hierarchical occlusion maps beside the cull; --maps --help tells more",
-    )
-    parser.add_argument(
-        "--tiling",
-        action="store_true",
-        help="instead: coverage bits in BSP order beside depth tiles; --tiling --help tells more",
-    )
-    parser.add_argument(
-        "--texts",
-        action="store_true",
-        help="instead: what published tests lose, and their time; --texts --help tells more",
-    )
-    parser.add_argument("--instances", type=args.count, help="in every scene but the castle")
+    frame.add_castle(parser)
+    for name, meaning in REPORTS.items():
+        parser.add_argument(
+            f"--{name}", action="store_true", help=f"instead: {meaning}; --{name} --help tells more"
+        )
     parser.add_argument("--views", type=args.count, help="of every scene")
     parser.add_argument(
         "--size", type=args.size, metavar="WIDTHxHEIGHT", help="of the views (default: 640x360)"
@@ -206,40 +193,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "--speed is no part of the package any more; in a checkout run `make bench-speed` "
             "or `python -m tools.speed`"
         )
-    if "--occluders" in arguments:
-        from . import occluders
-
-        return occluders.main([each for each in arguments if each != "--occluders"])
-    if "--maps" in arguments:
-        from . import maps
-
-        return maps.main([each for each in arguments if each != "--maps"])
-    if "--tiling" in arguments:
-        from . import tiling
-
-        return tiling.main([each for each in arguments if each != "--tiling"])
-    if "--texts" in arguments:
-        from . import texts
-
-        return texts.main([each for each in arguments if each != "--texts"])
-    parsed = parser.parse_args(arguments)
-    return args.execute(
-        PROG,
-        lambda: run(
-            parsed.out,
-            extent=parsed.extent,
-            keys=parsed.scene or catalogue.NAMES,
-            castle=parsed.castle,
-            seed=parsed.seed,
-            instances=parsed.instances,
-            views=parsed.views,
-            size=parsed.size,
-            repetitions=parsed.repetitions,
-            command=" ".join([PROG, *arguments]),
-        ),
-        lambda found: _tell(found, parsed.out),
-        as_json=parsed.json,
-    )
+    for name in REPORTS:
+        if f"--{name}" in arguments:
+            rest = [each for each in arguments if each != f"--{name}"]
+            code: int = import_module(f".{name}", __package__).main(rest)
+            return code
+    options = vars(parser.parse_args(arguments))
+    out = options["out"]
+    of_run = {name: value for name, value in options.items() if name not in REPORTS}
+    return frame.execute(PROG, run, of_run, arguments, lambda found: _tell(found, out))
 
 
 def _tell(found: Report, out: Path) -> None:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ..bounds import Boxes
-from ..commands import figure
+from ..commands import figure, page
 from ..device import Device
 from ..explanation import Verdict
 from ..scenes import mountains
@@ -141,13 +141,15 @@ def draw(path: Path, found: Found) -> None:
 
 def table(found: Found) -> list[str]:
     """The rows as lines of Markdown."""
-    lines = ["| texels | kept | of those in view | visible lost | texels read |"]
-    lines.append("|---|---:|---:|---:|---:|")
-    for row in found.rows:
-        kept = int(row.kept.sum())
-        share = f"{100.0 * kept / max(row.inside, 1):.1f} %"
-        lines.append(f"| {row.label} | {kept:,} | {share} | {row.lost:,} | {row.texels:,} |")
-    return lines
+    return page.table(
+        "texels | kept | of those in view | visible lost | texels read",
+        (_cells(row, int(row.kept.sum())) for row in found.rows),
+    )
+
+
+def _cells(row: Kept, kept: int) -> list[str]:
+    share = f"{100.0 * kept / max(row.inside, 1):.1f} %"
+    return [row.label, f"{kept:,}", share, f"{row.lost:,}", f"{row.texels:,}"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,7 +9,7 @@ Each scene has ``{key, name, instances, views, occluders, chosen, rows}``.
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -23,10 +23,10 @@ from ..device import Device
 from ..explanation import Verdict
 from ..measuring.configuration import DESCENT
 from ..occluders import select_occluders
-from ..progress import Progress
 from ..scenes import embree
 from ..scenes.fence import PARTS, fence
 from ..scenes.truth import linear_depth, make_caster
+from . import frame
 from .maps_results import LIMITS, NEGLIGIBLE, PICTURE, SIDE, Found, Row
 from .occluders import groups_of, made_with_groups
 
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from ..adapter import Adapter
     from ..camera import Camera
     from ..mesh import Mesh
     from ..methods import OcclusionMap
+    from ..progress import Progress
     from ..resources import Occluders, Pyramid
     from ..scenes import Scene, View
     from ..scenes.truth import Caster
@@ -55,16 +55,11 @@ REPETITIONS: Final = 5
 
 
 @dataclass
-class Report:
+class Report(frame.Run):
     """A run over all scenes."""
 
-    command: str
-    seed: int
-    adapter: Adapter
     scenes: list[Found] = field(default_factory=list)
-    missing: list[str] = field(default_factory=list)
     pictures: list[str] = field(default_factory=list)
-    seconds: float = 0.0
 
     @property
     def passed(self) -> bool:
@@ -74,19 +69,10 @@ class Report:
         ]
         return bool(certified) and not any(row.lost for row in certified)
 
-    def as_data(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {**asdict(self), "versions": report.versions()}
-
     def page(self) -> Page:
         """The tables and the pictures."""
-        page = Page("hizvk bench --maps")
-        page.items(
-            f"Command: `{self.command}` ({self.seconds:.0f} s; seed {self.seed})",
-            report.adapter_words(self.adapter),
-            report.version_words(),
-            *(f"Left out: {each}" for each in self.missing),
-        )
+        page = Page(PROG)
+        page.items(*self.opening())
         for scene in self.scenes:
             page.heading(scene.key)
             page.text(
@@ -155,8 +141,6 @@ def run(
     hizvk.HizError
         What the device refuses.
     """
-    started = time.perf_counter()
-    out.mkdir(parents=True, exist_ok=True)
     device = Device()
     found = Report(command=command, seed=seed, adapter=device.adapter)
     if not embree.can_cast():
@@ -165,23 +149,23 @@ def run(
         )
     if not figure.can_draw():
         found.missing.append(figure.missing())
-    with Progress(True, f"{PROG}: {', '.join(keys)}", len(keys), after_s=0.0) as steps:
-        for key in keys:
-            scene, meshes = _scene(key, instances, views or VIEWS, seed)
-            measured = _measure(device, key, scene, meshes, max_occluders)
-            found.scenes.append(measured)
-            if figure.can_draw():
-                from . import maps_pictures as drawing
 
-                walls, _ = _database(device, meshes)
-                view, limit = scene.views[0], measured.limit
-                found.pictures.append(drawing.maps(out, key, device, walls, view, limit))
-            steps.step(key)
+    def measure(key: str, steps: Progress) -> None:
+        scene, meshes = _scene(key, instances, views or VIEWS, seed)
+        measured = _measure(device, key, scene, meshes, max_occluders)
+        found.scenes.append(measured)
+        if figure.can_draw():
+            from . import maps_pictures as drawing
+
+            walls, _ = _database(device, meshes)
+            view, limit = scene.views[0], measured.limit
+            found.pictures.append(drawing.maps(out, key, device, walls, view, limit))
+
+    found.over(out, keys, measure, prog=PROG)
     if figure.can_draw():
         from . import maps_pictures as drawing
 
         found.pictures.insert(0, drawing.curve(out, found.scenes))
-    found.seconds = time.perf_counter() - started
     report.write(out, found.as_data(), found.page())
     return found
 
@@ -352,35 +336,21 @@ def _farther(
 
 def main(arguments: Sequence[str]) -> int:
     """Runs the command; exit code 1: it cannot run, or the certified cull lost something."""
-    parser = args.parser(
+    parser = frame.parser(
         PROG,
         "Hierarchical occlusion maps with holes of 0 to 64 negligible pixels beside the certified "
         "cull: hidden instances kept, visible ones lost, pixels lost, time. "
         "Draws the maps and the depth-estimation buffer of the first view of each scene, too.",
         out="out/bench-maps",
         holds="report and pictures",
+        names=NAMES,
+        seed=1997,
     )
-    args.add_several(parser, "--scene", NAMES)
-    parser.add_argument("--seed", type=int, default=1997, help="of the scenes (default: 1997)")
     parser.add_argument("--instances", type=args.count, help="in every scene")
-    parser.add_argument("--views", type=args.count, help="of every scene")
     parser.add_argument(
         "--max-occluders",
         type=args.count,
         help="that maps draw in a view (default: the best of 4, 16, 64 and all)",
     )
-    parsed = parser.parse_args(list(arguments))
-    return args.execute(
-        PROG,
-        lambda: run(
-            parsed.out,
-            keys=parsed.scene or NAMES,
-            seed=parsed.seed,
-            instances=parsed.instances,
-            views=parsed.views,
-            max_occluders=parsed.max_occluders,
-            command=" ".join([PROG, *arguments]),
-        ),
-        lambda found: print(found.page()),
-        as_json=parsed.json,
-    )
+    options = vars(parser.parse_args(list(arguments)))
+    return frame.execute(PROG, run, options, arguments, frame.print_page)

@@ -51,6 +51,8 @@ def curve(folder: Path, scenes: Sequence[Found]) -> str:
     for axis in axes[2:]:
         axis.set_xlabel("pixels of a hole that is negligible")
     axes[3].set_yscale("log")
+    axes[3].yaxis.set_major_formatter("{x:g}")
+    axes[3].yaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "235" else "")
     axes[0].legend(title="dotted: certified, with descent", fontsize=8, title_fontsize=8)
     figures.save(sheet, "hierarchical occlusion maps; lower is better", folder / "curve.png")
     return "curve.png"

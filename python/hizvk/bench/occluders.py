@@ -7,34 +7,31 @@ Each scene has ``{key, name, groups, views, size, cut, proxies}``.
 
 from __future__ import annotations
 
-import time
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from ..bounds import Boxes
-from ..commands import arguments as args
 from ..commands import report
 from ..commands.page import Page
 from ..device import Device
 from ..mesh import Mesh
 from ..occluders import inner_boxes, inner_prisms, split_mesh
-from ..progress import Progress
 from ..scenes import box_mesh, village
 from ..scenes.boulders import boulders
 from ..scenes.hedge import hedge
-from . import catalogue
+from . import catalogue, frame
 from .hiding import SHARES, Groups, Proxies, Row, Stage, cut, replaced
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     import numpy.typing as npt
 
     from .._arguments import Size
-    from ..adapter import Adapter
+    from ..progress import Progress
     from ..scenes import Scene
 
 __all__ = [
@@ -81,34 +78,20 @@ class Found:
 
 
 @dataclass
-class Report:
+class Report(frame.Run):
     """A run over all scenes."""
 
-    command: str
-    seed: int
-    adapter: Adapter
     scenes: list[Found] = field(default_factory=list)
-    missing: list[str] = field(default_factory=list)
-    seconds: float = 0.0
 
     @property
     def passed(self) -> bool:
         """Whether something was measured."""
         return bool(self.scenes)
 
-    def as_data(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {**asdict(self), "versions": report.versions()}
-
     def page(self) -> Page:
         """The tables."""
-        page = Page("hizvk bench --occluders")
-        page.items(
-            f"Command: `{self.command}` ({self.seconds:.0f} s; seed {self.seed})",
-            report.adapter_words(self.adapter),
-            report.version_words(),
-            *(f"Left out: {each}" for each in self.missing),
-        )
+        page = Page(PROG)
+        page.items(*self.opening())
         page.heading("Fewer occluders")
         page.text(
             "The part of the hidden instances that stay hidden when only a share of the triangles "
@@ -175,19 +158,13 @@ def run(
     hizvk.HizError
         What the device refuses.
     """
-    started = time.perf_counter()
-    out.mkdir(parents=True, exist_ok=True)
     device = Device()
     found = Report(command=command, seed=seed, adapter=device.adapter)
-    label = f"{PROG}: {', '.join(keys)}"
-    with Progress(True, label, len(keys), after_s=0.0) as steps:
-        for key in keys:
-            try:
-                found.scenes.append(_measure(device, key, castle, seed, instances, views))
-            except catalogue.Missing as missing:
-                found.missing.append(str(missing))
-            steps.step(key)
-    found.seconds = time.perf_counter() - started
+
+    def measure(key: str, _: Progress) -> None:
+        found.scenes.append(_measure(device, key, castle, seed, instances, views))
+
+    found.over(out, keys, measure, prog=PROG)
     report.write(out, found.as_data(), found.page())
     return found
 
@@ -257,35 +234,15 @@ def groups_of(scene: Scene, offsets: npt.NDArray[np.intp]) -> Groups:
 
 def main(arguments: Sequence[str]) -> int:
     """Runs the command; exit code 1: it cannot run."""
-    parser = args.parser(
+    parser = frame.parser(
         PROG,
         "What is lost when fewer or simpler occluders are drawn: rankings at 1/2, 1/4 and 1/8 of "
         "the triangles in view, and boxes and prisms inside of meshes.",
         out="out/bench-occluders",
         holds="report",
+        names=NAMES,
+        seed=2010,
     )
-    args.add_several(parser, "--scene", NAMES)
-    parser.add_argument("--seed", type=int, default=2010, help="of the scenes (default: 2010)")
-    parser.add_argument(
-        "--castle",
-        type=Path,
-        metavar="PATH",
-        help=f"castle.npz (or the variable {catalogue.VARIABLE})",
-    )
-    parser.add_argument("--instances", type=args.count, help="in every scene but the castle")
-    parser.add_argument("--views", type=args.count, help="of every scene")
-    parsed = parser.parse_args(list(arguments))
-    return args.execute(
-        PROG,
-        lambda: run(
-            parsed.out,
-            keys=parsed.scene or NAMES,
-            castle=parsed.castle,
-            seed=parsed.seed,
-            instances=parsed.instances,
-            views=parsed.views,
-            command=" ".join([PROG, *arguments]),
-        ),
-        lambda found: print(found.page()),
-        as_json=parsed.json,
-    )
+    frame.add_castle(parser)
+    options = vars(parser.parse_args(list(arguments)))
+    return frame.execute(PROG, run, options, arguments, frame.print_page)

@@ -36,21 +36,20 @@ report.json holds one object::
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from ..commands import report
 from ..commands.page import Page
-from . import whole_way
+from . import frame, whole_way
 from .results import STAGES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from ..adapter import Adapter
     from .results import Row, SceneResult
 
 __all__ = ["Report"]
@@ -60,16 +59,11 @@ SUFFICIENT: Final = (0.90, 0.95, 0.99)
 
 
 @dataclass
-class Report:
+class Report(frame.Run):
     """A run of the bench."""
 
-    command: str
-    seed: int
-    extent: str
-    adapter: Adapter
+    extent: str = "default"
     scenes: list[SceneResult] = field(default_factory=list)
-    missing: list[str] = field(default_factory=list)
-    seconds: float = 0.0
 
     def broken(self) -> list[str]:
         """What no run may find, in words: bugs.
@@ -92,17 +86,7 @@ class Report:
 
     def as_data(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "passed": self.passed,
-            "command": self.command,
-            "seed": self.seed,
-            "extent": self.extent,
-            "adapter": asdict(self.adapter),
-            "versions": report.versions(),
-            "seconds": self.seconds,
-            "missing": self.missing,
-            "scenes": [scene.as_data() for scene in self.scenes],
-        }
+        return {"passed": self.passed, **super().as_data()}
 
     def write(self, folder: Path, plots: dict[str, str]) -> None:
         """Writes report.json and report.md.
@@ -122,12 +106,7 @@ def _page(found: Report, plots: dict[str, str]) -> Page:
     verdict = "no configuration with the promise culled what can be seen"
     page = Page("hizvk bench")
     page.text(f"**{'FAILED: ' + '; '.join(broken) if broken else verdict}.**")
-    page.items(
-        f"Command: `{found.command}` ({found.seconds:.0f} s; seed {found.seed})",
-        report.adapter_words(found.adapter),
-        report.version_words(),
-        *(f"Left out: {each}" for each in found.missing),
-    )
+    page.items(*found.opening())
     page.heading("What suffices")
     page.text(
         "For each share of what the best rectangle test culls inside the view: the fastest "

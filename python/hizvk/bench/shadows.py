@@ -1,6 +1,7 @@
-"""Shadow casters: how many are kept in three views, by four ways.
+"""``hizvk bench --shadows``: how many shadow casters are kept in three views, by four ways.
 
-``python -m hizvk.bench.shadows`` prints the table of ``docs/shadows.md``.
+It prints the table of ``docs/shadows.md``.
+report.json holds ``{command, seed, adapter, versions, seconds, missing, descent, rows}``.
 
 - *Needed*: casters with a visible point in their shadow, by a shadow ray from every pixel.
 - *Frustum*: casters whose swept volume reaches into the view frustum.
@@ -13,19 +14,25 @@ So they are the best that such a cull can do.
 
 from __future__ import annotations
 
-import argparse
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 import hizvk
 
+from ..commands import arguments as args
+from ..commands import report
+from ..commands.page import Page
 from ..scenes.scene import box_mesh
 from ..scenes.sunlit import sunlit
+from . import frame
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     import numpy.typing as npt
 
     from .._arguments import Size
@@ -34,8 +41,14 @@ if TYPE_CHECKING:
     _Floats = npt.NDArray[np.float64]
     _Mask = npt.NDArray[np.bool_]
 
-__all__ = ["Row", "measure", "table"]
+__all__ = ["Report", "Row", "main", "measure", "run"]
 
+PROG: Final = "hizvk bench --shadows"
+HEAD: Final = "view | casters | needed | frustum alone | behind alone | ours | lost | ms"
+#: Of the town.
+SEED: Final = 5
+#: Small casters beside the houses.
+SMALL: Final = 4000
 #: Pixels of a view.
 SIZE: Final = (90, 160)
 NEAR: Final = 0.1
@@ -62,7 +75,7 @@ class Row:
     cull_ms: float
 
 
-def measure(size: Size = SIZE, *, small: int = 4000, descent: int = 0) -> list[Row]:
+def measure(size: Size = SIZE, *, small: int = SMALL, descent: int = 0) -> list[Row]:
     """The numbers of each view of the town.
 
     Parameters
@@ -177,32 +190,85 @@ def _by_rectangle(
     return inside, behind
 
 
-def table(rows: list[Row]) -> str:
-    """The rows as a Markdown table."""
-    lines = [
-        "| view | casters | needed | frustum alone | behind alone | ours | lost |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {row.view} | {row.casters:,} | {row.needed:,} | {row.frustum:,} | {row.behind:,} "
-        f"| {row.ours:,} | {row.lost} |"
-        for row in rows
-    ]
-    return "\n".join(lines)
+@dataclass
+class Report(frame.Run):
+    """A run over all views."""
+
+    descent: int = 0
+    rows: list[Row] = field(default_factory=list)
+
+    @property
+    def passed(self) -> bool:
+        """Whether something was measured, and no shadow is lost."""
+        return bool(self.rows) and not any(row.lost for row in self.rows)
+
+    def page(self) -> Page:
+        """The table."""
+        page = Page(PROG)
+        page.items(*self.opening(f"Texels that a test may read: {self.descent or 256}"))
+        page.table(HEAD, (cells(row) for row in self.rows))
+        page.text("`lost` are casters that are needed and not kept by ours: 0 is promised.")
+        return page
 
 
-def main() -> None:
-    """Prints the table, with the footprint's own descent and with a long one."""
-    argparse.ArgumentParser(
-        prog="python -m hizvk.bench.shadows",
-        description="Prints how many shadow casters are kept in three views, by four ways.",
-    ).parse_args()
-    for descent in (0, 4096):
-        rows = measure(descent=descent)
-        print(f"descent {descent or 256}\n")
-        print(table(rows))
-        print("\ncull and readback, ms:", ", ".join(f"{row.cull_ms:.1f}" for row in rows), "\n")
+def cells(row: Row) -> list[str]:
+    """A row of the table."""
+    numbers = (row.casters, row.needed, row.frustum, row.behind, row.ours, row.lost)
+    return [row.view, *(f"{number:,}" for number in numbers), f"{row.cull_ms:.1f}"]
 
 
-if __name__ == "__main__":
-    main()
+def run(
+    out: Path,
+    *,
+    size: Size = SIZE,
+    small: int = SMALL,
+    descent: int = 0,
+    command: str = PROG,
+) -> Report:
+    """Leaves report.md and report.json in `out`.
+
+    Parameters
+    ----------
+    out : Path
+        A folder; made if it is not there.
+    size, small, descent
+        As for `measure`.
+    command : str
+        The command that the report names.
+
+    Raises
+    ------
+    hizvk.HizError
+        What the device refuses.
+    """
+    started = time.perf_counter()
+    out.mkdir(parents=True, exist_ok=True)
+    found = Report(command, SEED, hizvk.Device().adapter, descent=descent)
+    found.rows = measure(size, small=small, descent=descent)
+    found.seconds = time.perf_counter() - started
+    report.write(out, found.as_data(), found.page())
+    return found
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the command; exit code 1: it cannot run, or a shadow is lost."""
+    parser = args.parser(
+        PROG,
+        "Shadow casters of a town that are needed, that the view volume or the depth alone keeps, "
+        "and that a cull by the light keeps (exit code 1 if a needed one is culled).",
+        out="out/bench-shadows",
+        holds="report",
+    )
+    parser.add_argument(
+        "--size", type=args.size, metavar="WIDTHxHEIGHT", help="of the views (default: 160x90)"
+    )
+    parser.add_argument(
+        "--small", type=args.count, help=f"small casters beside the houses (default: {SMALL})"
+    )
+    parser.add_argument("--descent", type=args.count, help="texels that a test may read, from 256")
+    options = {
+        name: value
+        for name, value in vars(parser.parse_args(list(arguments))).items()
+        if value is not None
+    }
+    return frame.execute(PROG, run, {"scene": None, **options}, arguments, frame.print_page)

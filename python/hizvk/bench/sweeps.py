@@ -22,6 +22,7 @@ import numpy as np
 
 import hizvk
 
+from ..commands import page
 from ..scenes.city import city
 
 if TYPE_CHECKING:
@@ -95,18 +96,21 @@ def measure(
 
 def table(rows: Sequence[Row]) -> str:
     """The rows as Markdown."""
-    lines = [
-        "| instances | kept per view | views per second, one thread | with conservative depth "
-        "| with a pool |",
-        "|---|---|---|---|---|",
+    head = (
+        "instances | kept per view | views per second, one thread | with conservative depth "
+        "| with a pool"
+    )
+    return "\n".join(page.table(head, (_cells(row) for row in rows), left=0))
+
+
+def _cells(row: Row) -> list[str]:
+    return [
+        f"{row.instances:,}",
+        f"{row.kept:,.1f}",
+        f"{row.here:.0f}",
+        f"{row.conservative:.0f}",
+        "" if row.pool is None else f"{row.pool:.0f}",
     ]
-    for row in rows:
-        pool = "" if row.pool is None else f"{row.pool:.0f}"
-        lines.append(
-            f"| {row.instances:,} | {row.kept:,.1f} | {row.here:.0f} | {row.conservative:.0f} "
-            f"| {pool} |"
-        )
-    return "\n".join(lines)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

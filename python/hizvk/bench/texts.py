@@ -8,7 +8,6 @@ Depth image, pyramid and bounds are there beforehand, and the mask is read after
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -20,20 +19,21 @@ from ..commands import figure, report
 from ..measuring.configuration import DESCENT, Configuration
 from ..measuring.spread import spread
 from ..measuring.stopwatch import cull
-from ..progress import Progress
 from ..scenes.gates import gates
 from ..scenes.truth import make_caster
-from . import catalogue
+from . import catalogue, frame
 from .results import Row
 from .score import look, score
 from .texts_report import PROG, Found, Method, Report
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     import numpy.typing as npt
 
     from .._arguments import Size
+    from ..progress import Progress
     from .catalogue import BenchScene
 
 __all__ = ["NAMES", "main", "measure", "run"]
@@ -221,22 +221,15 @@ def run(
     hizvk.HizError
         What the device refuses.
     """
-    started = time.perf_counter()
-    out.mkdir(parents=True, exist_ok=True)
     device = hizvk.Device()
     found = Report(command=command, seed=seed, adapter=device.adapter)
-    label = f"{PROG}: {', '.join(keys)}"
-    total = sum(views or VIEWS[key] for key in keys)
-    with Progress(True, label, total, after_s=0.0) as steps:
-        for key in keys:
-            count = instances or INSTANCES.get(key, 1)
-            try:
-                bench = _scene(key, count, views or VIEWS[key], seed, castle)
-            except catalogue.Missing as missing:
-                found.missing.append(str(missing))
-                continue
-            found.scenes.append(measure(bench, size, repetitions, device, steps.step))
-    found.seconds = time.perf_counter() - started
+
+    def of_scene(key: str, steps: Progress) -> None:
+        count = instances or INSTANCES.get(key, 1)
+        bench = _scene(key, count, views or VIEWS[key], seed, castle)
+        found.scenes.append(measure(bench, size, repetitions, device, steps.step))
+
+    found.over(out, keys, of_scene, prog=PROG, steps=sum(views or VIEWS[key] for key in keys))
     page = found.page()
     if figure.can_draw() and found.scenes:
         from .texts_plot import draw
@@ -251,41 +244,19 @@ def run(
 
 def main(arguments: Sequence[str]) -> int:
     """Runs the command; exit code 1: a promise was broken, or it cannot run."""
-    parser = args.parser(
+    parser = frame.parser(
         PROG,
         "What published visibility tests lose and how long they take, beside certified culls of "
         "the same depth image.",
         out="out/bench-texts",
         holds="report and plot",
+        names=NAMES,
+        seed=2010,
     )
-    args.add_several(parser, "--scene", NAMES)
-    parser.add_argument("--seed", type=int, default=2010, help="of the scenes (default: 2010)")
-    parser.add_argument(
-        "--castle",
-        type=Path,
-        metavar="PATH",
-        help=f"castle.npz (or the variable {catalogue.VARIABLE})",
-    )
-    parser.add_argument("--instances", type=args.count, help="in every scene but the castle")
-    parser.add_argument("--views", type=args.count, help="of every scene")
+    frame.add_castle(parser)
     parser.add_argument(
         "--size", type=args.size, default=SIZE, metavar="WIDTHxHEIGHT", help="of the views"
     )
     parser.add_argument("--repetitions", type=args.count, default=5, help="of each time")
-    parsed = parser.parse_args(list(arguments))
-    return args.execute(
-        PROG,
-        lambda: run(
-            parsed.out,
-            keys=parsed.scene or NAMES,
-            castle=parsed.castle,
-            seed=parsed.seed,
-            instances=parsed.instances,
-            views=parsed.views,
-            size=parsed.size,
-            repetitions=parsed.repetitions,
-            command=" ".join([PROG, *arguments]),
-        ),
-        lambda found: print(found.page()),
-        as_json=parsed.json,
-    )
+    options = vars(parser.parse_args(list(arguments)))
+    return frame.execute(PROG, run, options, arguments, frame.print_page)

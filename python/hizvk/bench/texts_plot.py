@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from ..commands import figure
+from ..commands.labels import Label, place
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from .texts_report import Found, Report
 
-__all__ = ["draw"]
+__all__ = ["draw", "figure_of"]
 
 PROMISED: Final = "#1a7f37"
 UNCERTIFIED: Final = "#c0392b"
@@ -26,6 +27,11 @@ COLUMNS: Final = 3
 
 def draw(path: Path, found: Report) -> None:
     """Writes the plot as a PNG."""
+    figure_of(found).savefig(path)
+
+
+def figure_of(found: Report) -> Any:
+    """The plot as a figure of matplotlib."""
     count = len(found.scenes)
     columns = min(COLUMNS, count + 1)
     # One cell more, for the legend.
@@ -34,37 +40,37 @@ def draw(path: Path, found: Report) -> None:
     cells = sheet.subplots(rows, columns, sharey=True, squeeze=False).reshape(-1)
     axes = cells[:count]
     most = max(100.0 * one.lost_share(row) for one in found.scenes for row in one.rows)
-    for axis, one in zip(axes, found.scenes, strict=True):
-        _panel(axis, one, max(ROOM * most, LEAST_TOP))
+    panels = [
+        (axis, _panel(axis, one, max(ROOM * most, LEAST_TOP)))
+        for axis, one in zip(axes, found.scenes, strict=True)
+    ]
     for axis in axes[::columns]:
         axis.set_ylabel("visible instances lost [%]")
     for cell in cells[count:]:
         cell.set_axis_off()
     _legend(cells[count], found.scenes[0])
-    figure.save(
-        sheet,
+    sheet.suptitle(
         f"Published tests and certified culls: what is lost, and the time ({found.adapter.name})",
-        path,
+        fontsize=11,
     )
+    # Labels keep clear of one another in pixels, so the layout comes first and then stays.
+    sheet.draw_without_rendering()
+    sheet.set_layout_engine("none")
+    for axis, labels in panels:
+        place(axis, labels, [(label.x, label.y) for label in labels])
+    return sheet
 
 
-def _panel(axis: Any, one: Found, top: float) -> None:
+def _panel(axis: Any, one: Found, top: float) -> list[Label]:
+    """Draws the points, and returns their numbers."""
     axis.axhspan(-0.3 * LINEAR_BELOW, 0.3 * LINEAR_BELOW, color=PROMISED, alpha=0.15, zorder=0)
+    labels = []
     for number, row in enumerate(one.rows, 1):
         colour = PROMISED if row.promises else UNCERTIFIED
-        place = row.ms.median, 100.0 * one.lost_share(row)
+        x, y = row.ms.median, 100.0 * one.lost_share(row)
         style = {"color": colour} if row.promises else {"facecolors": "none", "edgecolors": colour}
-        axis.scatter([place[0]], [place[1]], s=42, zorder=3, clip_on=False, **style)
-        axis.annotate(
-            str(number),
-            place,
-            # What promises has its number below, because its points lie on one line.
-            xytext=(0.0, -14.0 if row.promises else 6.0),
-            ha="center",
-            textcoords="offset points",
-            fontsize=8,
-            color=colour,
-        )
+        axis.scatter([x], [y], s=42, zorder=3, clip_on=False, **style)
+        labels.append(Label(x, y, str(number), {"fontsize": 8, "color": colour, "zorder": 4}))
     axis.set_xscale("log")
     axis.set_yscale("symlog", linthresh=LINEAR_BELOW)
     axis.set_ylim(-0.9 * LINEAR_BELOW, top)
@@ -77,6 +83,7 @@ def _panel(axis: Any, one: Found, top: float) -> None:
     axis.grid(True, which="major", color="#eeeeee", zorder=-1)
     axis.set_xlabel("one cull [ms]")
     axis.set_title(f"{one.key}: {one.instances:,} instances, {one.views} views", fontsize=10)
+    return labels
 
 
 def _legend(cell: Any, one: Found) -> None:

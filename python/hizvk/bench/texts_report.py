@@ -7,15 +7,14 @@ A row has ``{label, promises, lost, hairs, hidden_kept_in_view, ms}``.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
 
-from ..commands import report
 from ..commands.page import Page
+from . import frame
 
 if TYPE_CHECKING:
     from .._arguments import Size
-    from ..adapter import Adapter
     from ..measuring.spread import Spread
 
 __all__ = ["PROG", "Found", "Method", "Report", "table"]
@@ -62,15 +61,10 @@ class Found:
 
 
 @dataclass
-class Report:
+class Report(frame.Run):
     """A run over all scenes."""
 
-    command: str
-    seed: int
-    adapter: Adapter
     scenes: list[Found] = field(default_factory=list)
-    missing: list[str] = field(default_factory=list)
-    seconds: float = 0.0
 
     @property
     def passed(self) -> bool:
@@ -78,20 +72,10 @@ class Report:
         kept = all(row.lost == 0 for one in self.scenes for row in one.rows if row.promises)
         return bool(self.scenes) and kept
 
-    def as_data(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {**asdict(self), "versions": report.versions()}
-
     def page(self) -> Page:
         """The table."""
         page = Page(PROG)
-        page.items(
-            f"Command: `{self.command}` ({self.seconds:.0f} s; seed {self.seed})",
-            report.adapter_words(self.adapter),
-            report.version_words(),
-            *(f"Truth of {one.key}: {one.truth}" for one in self.scenes),
-            *(f"Left out: {each}" for each in self.missing),
-        )
+        page.items(*self.opening(*(f"Truth of {one.key}: {one.truth}" for one in self.scenes)))
         page.heading("Published tests beside certified culls")
         page.text(
             "Visible lost: instances that own a pixel and were culled, over all views.",

@@ -8,7 +8,7 @@ report.json holds ``{command, seed, adapter, versions, seconds, missing, rows}``
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,17 +20,16 @@ from ..commands import report
 from ..commands.page import Page
 from ..device import Device
 from ..methods import BspTiling
-from ..progress import Progress
 from ..scenes import village
 from ..scenes.boulders import boulders
-from . import catalogue
+from . import catalogue, frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from .._arguments import Size
-    from ..adapter import Adapter
+    from ..progress import Progress
     from ..scenes import Scene
 
 __all__ = ["NAMES", "Report", "Row", "image_cells", "main", "run", "tree_cells"]
@@ -76,36 +75,22 @@ class Row:
 
 
 @dataclass
-class Report:
+class Report(frame.Run):
     """A run over all scenes."""
 
-    command: str
-    seed: int
-    size: Size
-    adapter: Adapter
+    size: Size = SIZE
     rows: list[Row] = field(default_factory=list)
-    missing: list[str] = field(default_factory=list)
-    seconds: float = 0.0
 
     @property
     def passed(self) -> bool:
         """Whether something was measured, and all coverage is the same."""
         return bool(self.rows) and all(row.same for row in self.rows)
 
-    def as_data(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {**asdict(self), "versions": report.versions()}
-
     def page(self) -> Page:
         """The tables."""
-        page = Page("hizvk bench --tiling")
+        page = Page(PROG)
         height, width = self.size
-        page.items(
-            f"Command: `{self.command}` ({self.seconds:.0f} s; seed {self.seed})",
-            report.adapter_words(self.adapter),
-            report.version_words(),
-            *(f"Left out: {each}" for each in self.missing),
-        )
+        page.items(*self.opening())
         page.heading("Trees")
         page.table(TREES, (tree_cells(row) for row in self.rows), left=2)
         page.heading(f"Images of {width}x{height}, one thread")
@@ -180,19 +165,14 @@ def run(
     hizvk.HizError
         What the device refuses.
     """
-    started = time.perf_counter()
-    out.mkdir(parents=True, exist_ok=True)
     device = Device()
-    found = Report(command, seed, size or SIZE, device.adapter)
-    with Progress(True, f"{PROG}: {', '.join(keys)}", len(keys), after_s=0.0) as steps:
-        for key in keys:
-            try:
-                scene = _scene(key, views or VIEWS, seed)
-                found.rows += _measure(device, key, scene, found.size)
-            except catalogue.Missing as missing:
-                found.missing.append(str(missing))
-            steps.step(key)
-    found.seconds = time.perf_counter() - started
+    found = Report(command=command, seed=seed, adapter=device.adapter, size=size or SIZE)
+
+    def measure(key: str, _: Progress) -> None:
+        scene = _scene(key, views or VIEWS, seed)
+        found.rows += _measure(device, key, scene, found.size)
+
+    found.over(out, keys, measure, prog=PROG)
     report.write(out, found.as_data(), found.page())
     return found
 
@@ -261,30 +241,17 @@ def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
 
 def main(arguments: Sequence[str]) -> int:
     """Runs the command; exit code 1: it cannot run, or coverage differs."""
-    parser = args.parser(
+    parser = frame.parser(
         PROG,
         "Triangles in BSP order against a pyramid of coverage bits, beside the depth tiles: the "
         "same coverage, time, splits and memory (exit code 1 if a pixel differs).",
         out="out/bench-tiling",
         holds="report",
+        names=NAMES,
+        seed=1996,
     )
-    args.add_several(parser, "--scene", NAMES)
-    parser.add_argument("--seed", type=int, default=1996, help="of the scenes (default: 1996)")
-    parser.add_argument("--views", type=args.count, help="of every scene")
     parser.add_argument(
         "--size", type=args.size, metavar="WIDTHxHEIGHT", help="of the images (default: 640x360)"
     )
-    parsed = parser.parse_args(list(arguments))
-    return args.execute(
-        PROG,
-        lambda: run(
-            parsed.out,
-            keys=parsed.scene or NAMES,
-            seed=parsed.seed,
-            views=parsed.views,
-            size=parsed.size,
-            command=" ".join([PROG, *arguments]),
-        ),
-        lambda found: print(found.page()),
-        as_json=parsed.json,
-    )
+    options = vars(parser.parse_args(list(arguments)))
+    return frame.execute(PROG, run, options, arguments, frame.print_page)

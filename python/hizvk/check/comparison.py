@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import _arguments, foreign
+from .. import _arguments
 from . import reference
+from .sides import sides
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -98,24 +99,13 @@ def compare(mask: npt.ArrayLike, truth: npt.ArrayLike) -> Comparison:
     ([1], [2], 1.0)
     """
     kept = _arguments.bools("mask", mask, None)
-    truth = foreign.as_numpy("truth", f"bool or uint8 ({len(kept)},)", truth)
-    codes = np.asarray(truth)
-    if isinstance(truth, np.ndarray) and codes.dtype == np.uint8:
-        if codes.shape != kept.shape:
-            raise ValueError(
-                f"truth: expected uint8 ({len(kept)},), got {_arguments.describe(truth)}"
-            )
-        known = (reference.HIDDEN, reference.VISIBLE, reference.INVALID, reference.UNDECIDED)
-        unknown = codes[~np.isin(codes, known)]
-        if unknown.size:
-            raise ValueError(
-                f"truth: expected codes of hizvk.reference {known}, got {int(unknown[0])}"
-            )
-        is_visible = (codes == reference.VISIBLE) | (codes == reference.INVALID)
-        is_hidden = codes == reference.HIDDEN
-    else:
-        is_visible = _arguments.bools("truth", truth, len(kept))
-        is_hidden = ~is_visible
+    is_visible, is_hidden = sides(
+        truth,
+        len(kept),
+        yes=(reference.VISIBLE, reference.INVALID),
+        no=(reference.HIDDEN,),
+        source="hizvk.reference",
+    )
     return Comparison(
         false_culls=np.flatnonzero(is_visible & ~kept),
         false_keeps=np.flatnonzero(is_hidden & kept),

@@ -18,6 +18,7 @@ from ..bounds import Bounds, as_arrays
 from ..camera import Camera
 from ..depth import checked_image
 from ..progress import Progress
+from ..tolerance import numbers_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from .._types import DepthKind
     from ..progress import ProgressLike
+    from ..tolerance import Tolerance
 
 __all__ = [
     "COVERED",
@@ -65,6 +67,7 @@ def classify(
     kind: DepthKind,
     scale: float = 1.0,
     invalid: Collection[float] | None = None,
+    tolerance: Tolerance | None = None,
     coverage: Coverage = "area",
     own_depth: OwnDepth = "nearest",
     progress: ProgressLike = None,
@@ -83,6 +86,11 @@ def classify(
         What its numbers are, as in `Device.pyramid`.
         For ``"z"`` and ``"distance"`` the oracle finds the NDC depth by itself, exactly, between
         two neighbouring float32.
+    tolerance : Tolerance, optional
+        How far its depths may be off, in the world, as in `Device.pyramid`.
+        The truth is then that of the image whose depths are moved away from the eye by so much.
+        They are moved exactly, so a cull with the same tolerance hides nothing that this calls
+        `VISIBLE`.
     coverage : "area" or "sample"
         Which part of a pixel counts: its closed square, or its centre.
     own_depth : "nearest" or "pixel"
@@ -109,6 +117,7 @@ def classify(
     asked = (
         _arguments.choice("coverage", coverage, words(Coverage)),
         _arguments.choice("own_depth", own_depth, words(OwnDepth)),
+        numbers_of("tolerance", tolerance),
     )
     # The image as given: the tolerance for half floats is not part of the truth.
     image = (checked.floats(), checked.kind, checked.scale, checked.invalid)
@@ -140,8 +149,7 @@ def unoccluded(
 
     A pixel of exactly the far plane's depth is background.
     A pixel without a valid depth may hold anything, so nothing over it is unoccluded.
-    View depth and distance beyond the far plane are far, infinity included.
-    A cull takes these for no depth, so it finds fewer there.
+    View depth and distance beyond the far plane are background, infinity included.
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ import numpy as np
 from .. import _arguments, foreign
 from ..explanation import Verdict
 from . import reference
+from .sides import sides
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -79,37 +80,26 @@ def compare_unoccluded(verdicts: npt.ArrayLike, truth: npt.ArrayLike) -> Unocclu
     ([], [1], 0.5)
     """
     verdicts = foreign.as_numpy("verdicts", "uint8 (N,)", verdicts)
-    truth = foreign.as_numpy("truth", "bool or uint8 (N,)", truth)
     codes = np.asarray(verdicts)
     if codes.dtype != np.uint8 or codes.ndim != 1:
         kind = ValueError if codes.dtype == np.uint8 else TypeError
         raise kind(f"verdicts: expected uint8 (N,), got {_arguments.describe(verdicts)}")
-    told = np.asarray(truth)
-    if isinstance(truth, np.ndarray) and told.dtype == np.uint8:
-        if told.shape != codes.shape:
-            raise ValueError(
-                f"truth: expected uint8 ({len(codes)},), got {_arguments.describe(truth)}"
-            )
-        known = (reference.COVERED, reference.UNOCCLUDED, reference.INVALID, reference.UNDECIDED)
-        others = told[~np.isin(told, known)]
-        if others.size:
-            raise ValueError(
-                f"truth: expected codes of hizvk.reference.unoccluded {known}, got {int(others[0])}"
-            )
-        is_it = told == reference.UNOCCLUDED
-        is_open = told == reference.UNDECIDED
-    else:
-        is_it = _arguments.bools("truth", truth, len(codes))
-        is_open = np.zeros(len(codes), dtype=bool)
+    is_it, is_not = sides(
+        truth,
+        len(codes),
+        yes=(reference.UNOCCLUDED,),
+        no=(reference.COVERED, reference.INVALID),
+        source="hizvk.reference.unoccluded",
+    )
     unknown = codes[~np.isin(codes, list(Verdict))]
     if unknown.size:
         raise ValueError(f"verdicts: expected codes of hizvk.Verdict, got {int(unknown[0])}")
     is_claimed = codes == Verdict.UNOCCLUDED
     return UnoccludedComparison(
-        false_claims=np.flatnonzero(is_claimed & ~is_it & ~is_open),
+        false_claims=np.flatnonzero(is_claimed & is_not),
         missed=np.flatnonzero(is_it & ~is_claimed),
         total=len(codes),
         claimed=int(is_claimed.sum()),
         unoccluded=int(is_it.sum()),
-        undecided=int(is_open.sum()),
+        undecided=int((~is_it & ~is_not).sum()),
     )

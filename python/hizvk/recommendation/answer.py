@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
+from .. import _arguments
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -13,14 +15,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Recommendation", "notes_on"]
 
-#: How many candidates a printed table shows at least, where there are as many.
-#: All of the Pareto front and the best are among them.
+#: How many candidates a printed table shows.
 ROWS: Final = 10
 
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """What `recommend` found; ``print`` shows the best candidates as a table."""
+    """What `recommend` found; ``print`` shows ten candidates as a table, and `table` all."""
 
     best: Candidate
     """The candidate to use; it is `Candidate.safe`."""
@@ -47,28 +48,27 @@ class Recommendation:
         """The Pareto front of time and instances kept, the fastest first."""
         return tuple(one for one in self.candidates if one.on_front)
 
-    def _shown(self) -> list[Candidate]:
-        """What the printed table has: the front, the best, and the fastest of the others."""
-        room = ROWS - sum(one.on_front or one is self.best for one in self.candidates)
-        shown = []
-        for one in self.candidates:
-            if one.on_front or one is self.best:
-                shown.append(one)
-            elif room > 0:
-                room -= 1
-                shown.append(one)
-        return shown
+    def table(self, most: int | None = None) -> str:
+        """The candidates as a table, the fastest first; ``print`` of this object shows ten.
 
-    def __str__(self) -> str:
-        over = (
-            "" if self.within_budget else " (over the budget, as all are that may be recommended)"
-        )
+        Parameters
+        ----------
+        most : int, optional
+            How many rows; None: all.
+            The best comes first, then the best of each axis, the Pareto front, and the fastest.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If `most` is not an integer of at least 1.
+        """
+        if most is not None:
+            most = _arguments.integer("most", most, low=1, high=2**31 - 1)
         lines = [
-            f"on {self.adapter}: {self.best}{over}",
             "    ms per camera      kept     hides   unclear"
-            "   (* the Pareto front; - not for what was asked)",
+            "   (* the Pareto front; - not for what was asked)"
         ]
-        shown = self._shown()
+        shown = self._shown(most)
         for one in shown:
             share = 100.0 * one.kept / max(self.tested, 1)
             mark = "*" if one.on_front else " " if one.asked else "-"
@@ -77,8 +77,29 @@ class Recommendation:
                 f"{one.hides:8,}  {one.unclear:8,}   {one}"
                 + ("" if one.triangles is None else f", {one.triangles:,} triangles")
             )
-        if len(shown) < len(self.candidates):
-            lines.append(f"    and {len(self.candidates) - len(shown)} more, in candidates")
+        left = len(self.candidates) - len(shown)
+        if left:
+            rows = "row" if left == 1 else "rows"
+            lines.append(f"    and {left} more {rows}, which Recommendation.table() shows")
+        return "\n".join(lines)
+
+    def _shown(self, most: int | None) -> list[Candidate]:
+        """The rows of a table, in the order of `candidates`."""
+        known = {one.configuration: one for one in self.candidates}
+        of_axes = [
+            min(rows[1:], key=lambda one: (not one.safe, one.ms.median)).configuration
+            for rows in self.axes.values()
+        ]
+        order = [self.best, *(known[one] for one in of_axes), *self.front, *self.candidates]
+        wanted = dict.fromkeys(one.configuration for one in order)
+        shown = set(list(wanted)[:most])
+        return [one for one in self.candidates if one.configuration in shown]
+
+    def __str__(self) -> str:
+        over = (
+            "" if self.within_budget else " (over the budget, as all are that may be recommended)"
+        )
+        lines = [f"on {self.adapter}: {self.best}{over}", self.table(ROWS)]
         if self.axes:
             tried = (f"{name} ({len(rows) - 1})" for name, rows in self.axes.items())
             lines.append(f"one after the other, from the best so far: {', '.join(tried)}")

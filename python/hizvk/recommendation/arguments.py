@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -171,15 +172,25 @@ def lods_of(meshes: Any, lods: Any) -> tuple[tuple[MeshLods, ...] | None, tuple[
 
 
 def selections_of(
-    occluders: Any, triangles: int
+    occluders: Any, triangles: int, until: float
 ) -> dict[int, tuple[OccluderSelection, list[Mesh]]]:
-    """By budget of triangles: what `select_occluders` keeps, if it is a part of the meshes."""
+    """By budget of triangles: what `select_occluders` keeps, if it is a part of the meshes.
+
+    After the first no budget is tried that would not be done by `until`, as by `time.monotonic`.
+    """
     if occluders is None or isinstance(occluders, Occluders):
         return {}  # the host has no meshes
     meshes = meshes_of("occluders", occluders, A_MESH)
+    if len(meshes) < 2:
+        return {}  # there is nothing to select
     found = {}
+    took = 0.0
     for part in _SELECTED:
+        began = time.monotonic()
+        if part != _SELECTED[0] and began + took > until:
+            break
         selection = select_occluders(meshes, max_triangles=triangles // part)
         if 0 < len(selection) < len(meshes):
             found[triangles // part] = selection, [meshes[k] for k in selection.kept]
+        took = time.monotonic() - began
     return found

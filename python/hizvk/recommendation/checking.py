@@ -13,6 +13,8 @@ Where there is much to look at, a random part is looked at.
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -46,6 +48,8 @@ MOST_RAYS: Final = 60_000
 MOST_ORACLE: Final = 400 * POINTS
 #: How bare points before a depth image are checked.
 GUARD: Final = "a guard of half a pixel, since bare points lie on what the depth image shows"
+#: In how many parts instances are looked at, where the time is limited.
+PARTS: Final = 8
 #: The part of them that goes to instances proven hidden, so that the proofs are checked, too.
 SHARE_OF_PROVEN: Final = 0.125
 
@@ -140,6 +144,7 @@ def hold(
     *,
     every_ray: bool,
     steps: Progress,
+    until: float = math.inf,
 ) -> CheckedCandidates:
     """Compares every candidate with what is visible.
 
@@ -162,7 +167,11 @@ def hold(
         Such points lie on what the image shows, and it knows the depth only at its pixels' centres.
     steps : Progress
         Told of each view of each kind of bounds.
+    until : float
+        When to look at no further instances, by `time.monotonic`.
+        What was not looked at stays unclear where every ray counts.
     """
+    turns = len({one.volume for one in chosen} & set(alternatives)) * len(masks[0])
     found = CheckedCandidates(judge.method, [0] * len(chosen), [0] * len(chosen))
     random = np.random.default_rng(0)
     for volume in alternatives:
@@ -198,7 +207,10 @@ def hold(
                 first = open_ if proven else by_some & ~np.logical_and.reduce(list(culled.values()))
                 room = judge.most if points else judge.most // POINTS
                 asked = _pick(first, by_some & ~first, room, random)
-                visible[asked] = judge.visible(bounds, asked, k)
+                # Without a look all stays unclear where every ray counts; the oracle looks at some.
+                least = 0 if every_ray else 1
+                asked, shown = _looked(judge, bounds, asked, k, until, turns, least)
+                visible[asked] = shown
                 open_[asked] &= not points
                 open_ &= ~visible
             found.culled += int(by_some.sum())
@@ -207,8 +219,31 @@ def hold(
             for number in members:
                 found.hides[number] += int((visible & culled[number]).sum())
                 found.unclear[number] += int((open_ & culled[number]).sum()) if every_ray else 0
+            turns -= 1
             steps.step("checking")
     return found
+
+
+def _looked(
+    judge: Judge, bounds: Bounds, asked: Indices, k: int, until: float, turns: int, least: int
+) -> tuple[Indices, Mask]:
+    """Those that were looked at, and which of them are visible, if `turns` share the time left.
+
+    At least `least` parts of them are looked at.
+    """
+    if until == math.inf:
+        return asked, judge.visible(bounds, asked, k)
+    last = time.monotonic()
+    until = last + (until - last) / turns
+    looked, visible, took = [asked[:0]], [np.zeros(0, np.bool_)], 0.0
+    for part in range(PARTS):
+        if part >= least and last + took >= until:
+            break
+        looked.append(asked[part::PARTS])
+        visible.append(judge.visible(bounds, looked[-1], k))
+        now = time.monotonic()
+        last, took = now, now - last
+    return np.concatenate(looked), np.concatenate(visible)
 
 
 def _judged(volume: str, given: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from .. import _arguments
 from ..bounds import are_points
@@ -47,6 +47,9 @@ if TYPE_CHECKING:
     from ..resources import Occluders
 
 __all__ = ["recommend"]
+
+#: The part of the time that selecting occluders may take.
+SELECTING: Final = 0.2
 
 
 def recommend(
@@ -162,8 +165,10 @@ def recommend(
         Of these, the one whose lists draw the fewest triangles is recommended.
         None: an error of one pixel if `meshes` have errors, else halves of the size.
     max_seconds : float, optional
-        After so long no further repetition and no further axis begins; None: no limit.
-        The first candidates are always measured once.
+        About how long it may take; None: no limit.
+        No row begins that would not be done by then, as long as the last such row took.
+        One row is always measured, and some of what it culls is checked.
+        `Recommendation.notes` says what was left out.
     progress : bool or function, optional
         As everywhere (`hizvk.progress`); a step is a cull, a depth image or a check.
     **keywords
@@ -242,7 +247,8 @@ def recommend(
         alternatives["points"] = bare
         volumes["points"] = upload(bare, device, mesh_ids)
     triangles = None if walls is None else walls.num_triangles
-    selections = selections_of(occluders, triangles or 0)
+    now = time.monotonic()
+    selections = selections_of(occluders, triangles or 0, now + SELECTING * (until - now))
     source.selections = {budget: device.occluders(some) for budget, (_, some) in selections.items()}
     count = len(next(iter(volumes.values())))
     facts = Facts(count, triangles, tuple(selections), bare is not None, rules)

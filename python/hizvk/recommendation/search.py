@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from ..measuring.pareto import front
 from ..measuring.spread import spread
 from . import checking
 from .axes import AXES
+from .budget import admitted, by_use
 from .candidate import Candidate, choose
 from .timing import number_of_steps, time_all
 
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
     from .timing import DepthSource
 
 __all__ = ["Question", "Search"]
+
+#: The part of the time that the first candidates may take; checks and axes have the rest.
+FIRST: Final = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +86,21 @@ class Search:
         self._rows: dict[Configuration, _Row] = {}
         self._axes: dict[str, list[Candidate]] = {}
         self.left_out: list[str] = []
-        """Axes for which there was no time."""
+        """What there was no time for, in words."""
 
     def run(
         self, first: list[Configuration], facts: Facts
     ) -> tuple[list[Candidate], Candidate, bool, CheckedCandidates]:
         """All candidates, the best, whether it is within the budget, and the check."""
-        self._measure(first)
+        asked, began = self._question, time.monotonic()
+        first = by_use(first, every_ray=asked.every_ray, area=asked.coverage == "area")
+        measured = self._measure(first, began + FIRST * (asked.until - began))
+        if len(measured) < len(first):
+            self.left_out.append(f"{len(first) - len(measured)} of {len(first)} first candidates")
+        began = time.monotonic()
         check = self._check()
+        # As much is kept for the check at the end.
+        until = asked.until - (time.monotonic() - began)
         candidates = self._candidates(check)
         best, _ = self._choose(candidates)
         for axis in AXES:
@@ -98,12 +109,14 @@ class Search:
             variants = [] if start is None else axis.variants(start.configuration, facts)
             if start is None or not variants:
                 continue
-            if time.monotonic() > self._question.until:
-                self.left_out.append(axis.name)
-                continue
             tried = list(dict.fromkeys([start.configuration, *variants]))
-            self._measure(tried)
-            rows = [self._provisional(start, one) for one in tried]
+            measured = self._measure(tried, until) if time.monotonic() < until else tried[:1]
+            if len(measured) < len(tried):
+                part = "" if len(measured) == 1 else f"{len(tried) - len(measured)} rows of "
+                self.left_out.append(f"{part}{axis.name}")
+            if len(measured) == 1:
+                continue
+            rows = [self._provisional(start, one) for one in measured]
             self._axes[axis.name] = rows
             known = {one.configuration: one for one in [*candidates, *rows]}
             candidates = list(known.values())
@@ -138,8 +151,10 @@ class Search:
                 steps += number_of_steps(rows, views, self._question.repetitions)
         return steps
 
-    def _measure(self, chosen: list[Configuration]) -> None:
+    def _measure(self, chosen: list[Configuration], until: float) -> list[Configuration]:
+        """Measures the rows for which there is time, and returns them."""
         asked = self._question
+        chosen = admitted(chosen, asked.volumes, asked.source, asked.options, asked.meshes, until)
         steps = number_of_steps(chosen, asked.source.views, asked.repetitions)
         if self._steps.total is not None:
             self._steps.total = max(self._steps.total, self._steps.done + steps)
@@ -151,11 +166,12 @@ class Search:
             asked.options,
             self._steps,
             asked.meshes,
-            asked.until,
+            until,
         )
         for k, one in enumerate(chosen):
             cull_ms = spread(times.cull[k])
             self._rows[one] = _Row(times.total(k), cull_ms, times.masks[k], times.triangles[k])
+        return chosen
 
     def _check(self) -> CheckedCandidates:
         return checking.hold(
@@ -165,6 +181,7 @@ class Search:
             self._question.judge,
             every_ray=self._question.every_ray,
             steps=self._steps,
+            until=self._question.until,
         )
 
     def _candidate(self, one: Configuration, hides: int, unclear: int) -> Candidate:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from .. import _arguments
+from ..building import of_arrays
 from ..depth import DepthArray
 from ..measuring.configuration import DepthVariant
 from ..measuring.spread import spread
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..resources import DepthImage, Instances, Occluders, Pyramid
 
-__all__ = ["DepthSource", "Times", "number_of_steps", "time_all"]
+__all__ = ["SLOW_MS", "DepthSource", "Times", "number_of_steps", "once", "time_all"]
 
 #: A depth image that takes longer than this is not rendered again.
 SLOW_MS: Final = 200.0
@@ -83,7 +84,7 @@ class DepthSource:
             watch = Stopwatch(self.device)
             stored = _arguments.stored_levels("levels", variant.levels)
             image, view = self._images[k], self.views[k]
-            pyramid = self.device._pyramid_of(image, view, stored, depths=variant.depths)
+            pyramid = of_arrays(self.device, image, view, stored, depths=variant.depths)
             return pyramid, watch.lap()
         depth, took = self._depth(variant, k)
         watch = Stopwatch(self.device)
@@ -140,6 +141,21 @@ def number_of_steps(
     return once * len(views) * (repetitions + 1)
 
 
+def once(
+    device: Device,
+    instances: Instances,
+    pyramid: Pyramid,
+    one: Configuration,
+    base: CullOptions,
+    meshes: Sequence[MeshLods] | None,
+) -> tuple[npt.NDArray[np.bool_], float, float, int | None]:
+    """One cull: mask, milliseconds of cull and read, and the triangles that its lists draw."""
+    if one.lod is None:
+        return *cull(device, instances, pyramid, one, base), None
+    assert meshes is not None
+    return drawn_triangles(device, instances, pyramid, one.options(base), meshes)
+
+
 def time_all(
     chosen: Sequence[Configuration],
     volumes: Mapping[str, Instances],
@@ -174,18 +190,12 @@ def time_all(
                 number = (turn + repetition * len(chosen) // rounds + k) % len(chosen)
                 one = chosen[number]
                 instances, pyramid = volumes[one.volume], made[one.depth][0]
-                if one.lod is None:
-                    mask, *both = cull(source.device, instances, pyramid, one, base)
-                else:
-                    assert meshes is not None
-                    mask, *both, drawn = drawn_triangles(
-                        source.device, instances, pyramid, one.options(base), meshes
-                    )
-                    if repetition == 0:
-                        triangles[number] = (triangles[number] or 0) + drawn
+                mask, *both, drawn = once(source.device, instances, pyramid, one, base, meshes)
                 culling[number, repetition, k], reading[number, repetition, k] = both
                 if repetition == 0:
                     masks[number].append(mask)
+                    if drawn is not None:
+                        triangles[number] = (triangles[number] or 0) + drawn
                 steps.step("timing")
     counted = {variant: ms[1:rounds] for variant, ms in depth_ms.items()}
     return Times(chosen, counted, culling[:, 1:rounds], reading[:, 1:rounds], masks, triangles)

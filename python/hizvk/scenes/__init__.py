@@ -17,6 +17,7 @@ The ray caster that checks a cull therefore starts from the same numbers as the 
 - `fence`: planks with knotholes
 - `hedge`: where ranking occluders by size and distance fails
 - `gates`: where published tests go wrong
+- `rows`: large things in rows, and what stands between them
 - `houses`: `village`: turned houses with gable roofs
 - `doors`: doors that open and close and a bus that drives by
 - `embree`: Embree's ray caster

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .grid import apart, on_grid
-from .scene import Scene, View, box_mesh
+from .grid import on_grid
+from .rows import Rows
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .grid import Floats
+    from .scene import Scene
 
 __all__ = ["Boulders", "boulder", "boulders"]
 
-#: Metres from boulder to boulder, and the height of eyes.
+#: Metres from boulder to boulder.
 PITCH: Final = 12.0
-EYE: Final = 1.703125
 #: Steps along each edge of the cube from which a boulder is blown up; it has 12 of their squares
 #: triangles.
 STEPS: Final = 20
@@ -58,44 +58,26 @@ def boulders(count: int = 64, things: int = 4000, views: int = 8, *, seed: int =
         Same seed, same scene.
     """
     rng = np.random.default_rng(seed)
-    side = int(np.ceil(np.sqrt(count)))
-    cell = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), -1).reshape(-1, 2)
+    rows = Rows.of(count, PITCH)
     shapes, faces = [], []
-    for number, place in enumerate(cell):
+    for number, place in enumerate(rows.middles):
         unit, triangles = boulder(rng)
         shape = unit * rng.uniform((3.0, 3.0, 2.5), (5.0, 5.0, 5.0))
-        shapes.append(on_grid(shape + np.append(place * PITCH, 1.0)))
+        shapes.append(on_grid(shape + np.append(place, 1.0)))
         faces.append(triangles + np.uint32(number * len(unit)))
-    # Things and eyes stand at the corners of the rows, 8.5 m from the nearest middle.
-    places, corners = apart(rng, side, views, things)
-    corner = on_grid((corners + 0.5) * PITCH)
-    low = np.zeros((things, 3))
-    low[:, :2] = on_grid(corner + rng.uniform(-1.5, 0.5, (things, 2)))
-    low[:, 2] = on_grid(rng.uniform(0.0, 6.0, things))
-    high = low + on_grid(rng.uniform(0.2, 1.0, (things, 3)))
-    shape, sides = box_mesh(low, high)
-    eyes = []
-    for number, place in enumerate((places + 0.5) * PITCH):
-        eye = on_grid([*place, EYE])
-        heading = rng.uniform(0.0, 2.0 * np.pi)
-        target = eye + np.array([10.0 * np.cos(heading), 10.0 * np.sin(heading), 0.0])
-        eyes.append(
-            View(f"between {number}", tuple(eye.tolist()), tuple(target.tolist()), 60.0, 0.125)
-        )
-    middle = 0.5 * (side - 1) * PITCH
-    scene = Scene(
-        name=f"{len(cell)} boulders",
-        origin=(middle, middle, 0.0),
-        vertices=np.concatenate(shapes),
-        triangles=np.concatenate(faces),
-        instance_vertices=shape,
-        instance_triangles=sides,
-        owner=np.repeat(np.arange(things, dtype=np.int32), 12),
-        box_min=low,
-        box_max=high,
-        views=tuple(eyes),
+    # The corners of the rows are 8.5 m from the nearest middle.
+    scene = rows.scene(
+        rng,
+        f"{len(shapes)} boulders",
+        (np.concatenate(shapes), np.concatenate(faces)),
+        things=things,
+        beside=(-1.5, 0.5),
+        up_to=6.0,
+        sizes=(0.2, 1.0),
+        views=views,
+        called="between",
     )
-    return Boulders(scene, len(cell))
+    return Boulders(scene, len(shapes))
 
 
 def boulder(rng: np.random.Generator) -> tuple[Floats, npt.NDArray[np.uint32]]:

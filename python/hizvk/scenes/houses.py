@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .grid import apart, on_grid
-from .scene import Scene, View, box_mesh
+from .grid import on_grid
+from .rows import Rows
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .grid import Floats
+    from .scene import Scene
 
 __all__ = ["gabled_houses", "village"]
 
-#: Metres from house to house, and the height of eyes.
+#: Metres from house to house.
 PITCH: Final = 18.0
-EYE: Final = 1.703125
 #: Corners of a house: the floor (0 to 3), the eaves (4 to 7), the ridge (8, 9) along x.
 FACES: Final = (
     (0, 2, 1), (0, 3, 2),  # floor
@@ -82,37 +82,18 @@ def village(houses: int = 64, things: int = 4000, views: int = 8, *, seed: int =
         Same seed, same village.
     """
     rng = np.random.default_rng(seed)
-    side = int(np.ceil(np.sqrt(houses)))
-    cell = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), -1).reshape(-1, 2)
-    count = len(cell)
+    rows = Rows.of(houses, PITCH)
+    count = len(rows.middles)
     sizes = on_grid(rng.uniform((9.0, 6.0, 3.0, 6.0), (13.0, 9.0, 6.0, 10.0), (count, 4)))
-    vertices, triangles = gabled_houses(cell * PITCH, sizes, rng.uniform(0.0, 180.0, count))
-    # Things and eyes stand where the rows' corners are, so that no house holds them.
-    places, corners = apart(rng, side, views, things)
-    corner = on_grid((corners + 0.5) * PITCH)
-    low = np.zeros((things, 3))
-    low[:, :2] = on_grid(corner + rng.uniform(-1.5, 1.5, (things, 2)))
-    low[:, 2] = on_grid(rng.uniform(0.0, 9.0, things))
-    high = low + on_grid(rng.uniform(0.3, 1.5, (things, 3)))
-    shape, faces = box_mesh(low, high)
-    eyes = []
-    for number, place in enumerate((places + 0.5) * PITCH):
-        eye = on_grid([*place, EYE])
-        heading = rng.uniform(0.0, 2.0 * np.pi)
-        target = eye + np.array([10.0 * np.cos(heading), 10.0 * np.sin(heading), 0.0])
-        eyes.append(
-            View(f"corner {number}", tuple(eye.tolist()), tuple(target.tolist()), 60.0, 0.125)
-        )
-    middle = 0.5 * (side - 1) * PITCH
-    return Scene(
-        name=f"a village of {count} turned houses",
-        origin=(middle, middle, 0.0),
-        vertices=vertices,
-        triangles=triangles,
-        instance_vertices=shape,
-        instance_triangles=faces,
-        owner=np.repeat(np.arange(things, dtype=np.int32), 12),
-        box_min=low,
-        box_max=high,
-        views=tuple(eyes),
+    # No house reaches as far as the corners of the rows, where things and eyes stand.
+    return rows.scene(
+        rng,
+        f"a village of {count} turned houses",
+        gabled_houses(rows.middles, sizes, rng.uniform(0.0, 180.0, count)),
+        things=things,
+        beside=(-1.5, 1.5),
+        up_to=9.0,
+        sizes=(0.3, 1.5),
+        views=views,
+        called="corner",
     )

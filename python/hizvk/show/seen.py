@@ -65,8 +65,12 @@ class Seen(NamedTuple):
 
     def picture(self) -> bytes:
         """A PNG: depth in greys, and outlines of instances: hidden ones red, kept ones white."""
+        return png(self.image(SIDE))
+
+    def image(self, side: int) -> npt.NDArray[np.uint8]:
+        """``(tall, wide, 3)``: the picture, with `side` pixels along the longer side."""
         view = RayView(self.camera)
-        factor = SIDE / max(view.size)
+        factor = side / max(view.size)
         tall, wide = (max(round(side * factor), 1) for side in view.size)
         rows = ((np.arange(tall) + 0.5) / factor).astype(np.intp).clip(max=view.size[0] - 1)
         columns = ((np.arange(wide) + 0.5) / factor).astype(np.intp).clip(max=view.size[1] - 1)
@@ -77,7 +81,7 @@ class Seen(NamedTuple):
             classes = shapes.classes[owners]
             for one in (HIDDEN, KEPT):  # kept ones on top
                 draw(image, factor * lines[classes == one], rgb(CLASS_COLOURS[one]))
-        return png(image)
+        return image
 
     def html(self) -> str:
         """The picture above a table of the counts."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     _Doubles = npt.NDArray[np.float64]
 
-__all__ = ["UPS", "Above", "plot", "up_of"]
+__all__ = ["UPS", "Above", "draw_view", "plot", "up_of"]
 
 #: Which way is up: a world axis, with a minus where the axis points down.
 UPS: Final = ("x", "y", "z", "-x", "-y", "-z")
@@ -80,14 +80,15 @@ def plot(seen: Seen, up: str, most: int) -> Any:
     sheet = figure(wide + tall + 1.2, tall + 1.5)
     sheet.set_facecolor("white")
     left, right = sheet.subplots(1, 2, width_ratios=(wide, tall))
-    _view(left, seen, shapes)
+    draw_view(left, seen, shapes)
     _map(right, seen, shapes, Above.of(up))
     _legend(sheet, seen, shapes)
     sheet.suptitle(seen.title, size=11)
     return sheet
 
 
-def _view(axis: Any, seen: Seen, shapes: Shapes) -> None:
+def draw_view(axis: Any, seen: Seen, shapes: Shapes) -> None:
+    """Draws the depth image, and over it the outlines."""
     height, width = seen.camera.size
     axis.imshow(grey(thinned(seen.depth)), extent=(0, width, height, 0), interpolation="nearest")
     lines, owners = outlines(RayView(seen.camera), shapes)

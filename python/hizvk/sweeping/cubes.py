@@ -75,7 +75,10 @@ def cube(
     >>> [bool(one.project([(3.0, 3.0, -3.0)]).inside[0]) for one in cameras]
     [True, False, False, False, False, True]
     """
-    x, y, z = _arguments.vector("eye", eye)
+    x, y, z = _arguments.numbers_of_shape("eye", eye, (3,), hint=_several(eye)).tolist()
+    if isinstance(size, (tuple, list)):
+        got = _arguments.describe(size)
+        raise TypeError(f"size: expected an integer, the pixels per side of a square, got {got}")
     size = _arguments.integer("size", size, low=1, high=_arguments.LARGEST_SIDE)
     seam = _arguments.number("seam_px", seam_px, at_least=0.0, at_most=size / 4.0)
     # `size` pixels show the face, 2 wide at depth 1, and the seam on both sides.
@@ -100,3 +103,12 @@ def cube(
     ]
     a, b, c, d, e, f = made
     return a, b, c, d, e, f
+
+
+def _several(eye: object) -> str:
+    """The way out for several places in the place of one."""
+    many = len(getattr(eye, "shape", ())) == 2 and eye.shape[1] == 3  # type: ignore[attr-defined]
+    if isinstance(eye, (list, tuple)) and eye:
+        many = all(hasattr(one, "__len__") and len(one) == 3 for one in eye)
+    call = "[camera for one in eye for camera in hizvk.cube(one, ...)]"
+    return f"; one call is for one eye, and sweep takes them all: {call}" if many else ""

@@ -261,11 +261,7 @@ def _unpacked(row: npt.NDArray[np.uint8], count: int) -> npt.NDArray[np.bool_]:
 
 
 def _index(name: str, value: object, count: int) -> int:
-    try:
-        return _arguments.integer(name, value, low=0, high=count - 1)
-    except ValueError:
-        expected = f"an integer in 0..{count - 1}" if count else "nothing, for there are none"
-        raise IndexError(f"{name}: expected {expected}, got {value}") from None
+    return _arguments.index(name, value, count, none="there are none")
 
 
 def _path(name: str, value: object) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import warnings
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from .. import _arguments
 from ..bounds import OrientedBoxes
+from ..errors import HizWarning
 from ..mesh import Mesh
 from .cubes import cube
 from .entry import sweep
@@ -25,6 +27,11 @@ if TYPE_CHECKING:
     _Floats = npt.NDArray[np.float64]
 
 __all__ = ["viewshed"]
+
+#: What files of heights write where there is no data: ESRI's grids, and SRTM.
+NO_DATA: Final = (-9999.0, -32768.0)
+#: No position may be as far away as this; GDAL writes -3.4e38 where there is no data.
+TOO_FAR: Final = 1e30
 
 
 def viewshed(
@@ -89,6 +96,11 @@ def viewshed(
     SweepInterrupted
         As in `sweep`.
 
+    Warns
+    -----
+    HizWarning
+        If heights are a number that files use for "no data", such as -9999.
+
     References
     ----------
     The parameters are those of GDAL's ``gdal_viewshed``, which looks at one line of sight per cell.
@@ -106,6 +118,7 @@ def viewshed(
     (True, False, True)
     """
     grid = _heights("heights", heights)
+    _hint_at_no_data(grid)
     steps = _steps("cell_size", cell_size)
     row, column = _arguments.numbers_of_shape("eye", eye, (2,)).tolist()
     eye_height = _arguments.number("eye_height", eye_height, above=0.0)
@@ -141,7 +154,25 @@ def _heights(name: str, value: Any) -> _Floats:
         raise ValueError(f"{name}: expected at least 2 x 2 heights, got {grid.shape}")
     if np.isinf(grid).any():
         raise ValueError(f"{name}: expected finite heights, or NaN for no data, got infinite ones")
+    far = np.abs(grid) >= TOO_FAR
+    if far.any():
+        raise ValueError(
+            f"{name}: expected heights below 1e30, or NaN for no data, got {grid[far][0]:g}; if "
+            f"that is no data, pass np.where(np.abs({name}) < 1e30, {name}, np.nan)"
+        )
     return grid
+
+
+def _hint_at_no_data(grid: _Floats) -> None:
+    for number in NO_DATA:
+        count = int(np.count_nonzero(grid == number))
+        if count:
+            warnings.warn(
+                f"heights: {count:,} are {number:g}, which files of heights use for no data, and "
+                f"count as deep holes here; pass np.where(heights == {number:g}, np.nan, heights)",
+                HizWarning,
+                stacklevel=3,  # the caller of viewshed
+            )
 
 
 def _steps(name: str, value: Any) -> tuple[float, float]:

@@ -37,7 +37,7 @@ impl App {
             })
         };
         let picture = target(TextureFormat::Rgba8Unorm, Tex::COPY_SRC);
-        let depth = target(TextureFormat::Depth32Float, Tex::TEXTURE_BINDING);
+        let depth = target(TextureFormat::Depth32Float, Tex::TEXTURE_BINDING | Tex::COPY_SRC);
 
         let source = ShaderSource::Wgsl(include_str!("boxes.wgsl").into());
         let module = &device.create_shader_module(ShaderModuleDescriptor { label: None, source });

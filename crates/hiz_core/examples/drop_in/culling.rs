@@ -11,7 +11,7 @@ pub(crate) const SIZE: hiz::ImageSize = hiz::ImageSize { width: 1024, height: 57
 pub(crate) const HOUSES: std::ops::Range<u32> = CRATES..CRATES + 900;
 
 /// Crates lie anywhere; the houses, which come last, stand in 30 rows with streets between them.
-fn body(i: u32) -> Body {
+pub(crate) fn body(i: u32) -> Body {
     let spread = |k: f64| (600.0 * (f64::from(i) * k).fract() - 300.0) as f32;
     let row = |k: u32| k as f32 * 20.0 - 290.0;
     let (x, z, half, height) = match i.checked_sub(CRATES) {
@@ -26,7 +26,7 @@ pub(crate) struct Town {
     pub(crate) app: App,
     pub(crate) visible: hiz::Visible,
     device: Device,
-    camera: hiz::Camera,
+    pub(crate) camera: hiz::Camera,
     hiz: hiz::HizContext,
     pyramid: hiz::Pyramid,
     crates: hiz::Instances,

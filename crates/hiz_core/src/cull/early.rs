@@ -121,7 +121,8 @@ fn record_tests(
 ) -> Result<()> {
     gpu.recorded(|| {
         let target = target(gpu, instances, options, temporal, set)?;
-        let key = CullKey::without_depth(instances.kind, false);
+        let decision = FramePass::Early(set.candidates).decision();
+        let key = CullKey { decision, ..CullKey::without_depth(instances.kind, false) };
         let tests = Tests::new(gpu, key, &target, cull_pipeline)?;
         let bindings = temporal.pieces.iter().map(|history| &history.cut);
         let cut = Cut::new(gpu, instances, &temporal.early, bindings)?;

@@ -151,7 +151,7 @@ impl<'a> GroupCull<'a> {
         let accepts = key.nearest && !key.sample_coverage;
         Ok(Self {
             tiers,
-            members: cull_members_pipeline(gpu, &key, &report)?,
+            members: cull_members_pipeline(gpu, &key.of_instances(&report), &report)?,
             accept: accepts.then(|| accept_members_pipeline(gpu, &key, &report)).transpose()?,
         })
     }

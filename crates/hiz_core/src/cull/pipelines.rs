@@ -11,6 +11,7 @@ use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{File, Source, wgsl};
 use crate::input::bounds::BoundsKind;
 use crate::instances::piece::RECORD_BINDINGS;
+use crate::output::bins::PlaneSet;
 
 /// Everything in which one cull pipeline differs from another.
 /// Each is compiled without the branches that it does not take.
@@ -41,6 +42,8 @@ pub(crate) enum Decision {
     Seen,
     /// Whether its shadow may be seen.
     Shadow,
+    /// Whether it may lie in the view, whatever hides it.
+    InView,
 }
 
 impl Decision {
@@ -57,11 +60,25 @@ impl Decision {
                 wgsl!("cull/shadow"),
                 wgsl!("cull/shadow_classify"),
             ],
+            Self::InView => {
+                &[wgsl!("cull/supporting_planes"), wgsl!("cull/unoccluded"), wgsl!("cull/in_view")]
+            }
         }
     }
 }
 
 impl CullKey {
+    /// The key of the tests of instances, for what they report.
+    ///
+    /// What surely shows is kept, and so is what may show.
+    /// Where nothing tells them apart, the nearest depths need not be read.
+    /// A descent reads them all the same: it ends where an instance surely shows.
+    pub(super) fn of_instances(self, report: &ReportKey) -> Self {
+        let descends = self.descent || self.fit_volume || self.decision == Decision::Shadow;
+        let is_told = report.verdicts || report.statistics;
+        Self { nearest: self.nearest && (is_told || descends), ..self }
+    }
+
     /// The key of a pass that reads no depth.
     pub(crate) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
         Self {
@@ -155,6 +172,14 @@ impl FramePass {
         }
     }
 
+    /// What an early pass decides about a candidate: sizes need its rectangle.
+    pub(crate) fn decision(self) -> Decision {
+        match self {
+            Self::Early(Candidates::History | Candidates::Given) => Decision::InView,
+            Self::Early(Candidates::Size) | Self::Alone | Self::Late => Decision::Seen,
+        }
+    }
+
     /// The constant that an early pass has besides.
     fn constant(self) -> Option<(&'static str, f64)> {
         match self {
@@ -172,7 +197,7 @@ pub(crate) enum EmitKey {
     /// One list, or none.
     List { append: bool, list: bool, capped: bool },
     /// Bit planes, of which bins are made later.
-    Planes { by_index: bool, bins: BinKey },
+    Planes { by_index: bool, set: PlaneSet, bins: BinKey },
     /// The bins of one mesh, in any order.
     Append { list: bool, capped: bool, record_words: u32, bins: BinKey },
 }
@@ -225,9 +250,10 @@ impl EmitKey {
             Self::List { append, list, capped } => {
                 vec![("APPEND", flag(append)), ("LIST", flag(list)), ("CAPPED", flag(capped))]
             }
-            Self::Planes { by_index, bins } => {
-                bins.constants().chain([("BY_INDEX", flag(by_index))]).collect()
-            }
+            Self::Planes { by_index, set, bins } => bins
+                .constants()
+                .chain([("BY_INDEX", flag(by_index)), ("PLANES", f64::from(set.planes()))])
+                .collect(),
             Self::Append { list, capped, record_words, bins } => bins
                 .constants()
                 .chain([
@@ -432,6 +458,7 @@ pub(crate) fn decision_module(
             wgsl!("cull/certificate"),
             wgsl!("output/verdict"),
             wgsl!("cull/outcome"),
+            wgsl!("cull/decision"),
             wgsl!("pyramid/levels"),
         ],
         &store.files(),
@@ -482,8 +509,12 @@ pub(crate) fn cull_boxes_module(
     (pass, is_top): (FramePass, bool),
 ) -> Source {
     let shared = [wgsl!("instances/tier"), wgsl!("instances/groups"), wgsl!("output/statistics")];
-    let which = if is_top { wgsl!("cull/cull_groups") } else { wgsl!("cull/cull_children") };
-    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_box"), which]].concat();
+    let which: &[File] = if is_top {
+        &[wgsl!("cull/cull_groups")]
+    } else {
+        &[wgsl!("cull/parents"), wgsl!("cull/cull_children")]
+    };
+    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_box")], which].concat();
     unexplained(store, BoundsKind::Box, decision, &entry)
 }
 
@@ -519,7 +550,7 @@ fn members_module(
         wgsl!("output/report"),
         wgsl!("instances/groups"),
     ];
-    let last = [wgsl!("cull/survivors"), entry];
+    let last = [wgsl!("cull/parents"), entry];
     let files = [&shared[..], &emit.files(), pass.member_files(), &last].concat();
     unexplained(store, kind, decision, &files)
 }

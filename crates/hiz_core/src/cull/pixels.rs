@@ -39,7 +39,10 @@ pub(crate) struct CountingUniform {
 /// The shader that counts pixels.
 pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
     let row = match store {
-        DepthStore::Apart(SourceKind::Bits | SourceKind::Pair) => {
+        DepthStore::Apart(SourceKind::Pair) => {
+            [wgsl!("cull/pixels_row_pair"), wgsl!("cull/pixels_row_apart")].to_vec()
+        }
+        DepthStore::Apart(SourceKind::Bits) => {
             [wgsl!("cull/pixels_row_bits"), wgsl!("cull/pixels_row_apart")].to_vec()
         }
         DepthStore::Apart(_) => {
@@ -47,11 +50,15 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
         }
         DepthStore::Atlas => vec![wgsl!("cull/pixels_row_atlas")],
     };
+    let alone: &[_] = match store {
+        DepthStore::Apart(SourceKind::Pair) => &[],
+        _ => &[wgsl!("cull/pixels_row_alone")],
+    };
     let planes = match kind {
         BoundsKind::Box | BoundsKind::OrientedBox => wgsl!("cull/pixels_planes_box"),
         _ => wgsl!("cull/pixels_planes_any"),
     };
-    let own = [
+    let count = [
         wgsl!("instances/piece"),
         planes,
         wgsl!("cull/pixels_planes"),
@@ -59,8 +66,7 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
         wgsl!("cull/pixels_walk"),
         wgsl!("cull/pixels"),
     ];
-    let entry = [&row[..], &own];
-    unexplained(store, kind, Decision::Seen, &entry.concat())
+    unexplained(store, kind, Decision::Seen, &[&row[..], alone, &count].concat())
 }
 
 fn pixels_pipeline(

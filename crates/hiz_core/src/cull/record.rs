@@ -368,7 +368,7 @@ impl<'a> Tests<'a> {
         let flat = if groups.iter().all(Option::is_some) {
             None
         } else {
-            Some(flat(gpu, &key, &target.report)?)
+            Some(flat(gpu, &key.of_instances(&target.report), &target.report)?)
         };
         Ok(Self { target, groups, flat })
     }
@@ -440,6 +440,7 @@ fn report_key(
         match (any_order, bins.can_append()) {
             (false, _) => EmitKey::Planes {
                 by_index: bins.arrangement == Arrangement::Instances,
+                set: bins.plane_set(),
                 bins: of_bins,
             },
             (true, true) => EmitKey::Append {
@@ -492,6 +493,7 @@ pub(super) fn pass_report(
     let emit = match &visible.bins {
         Some(bins) => EmitKey::Planes {
             by_index: bins.arrangement == Arrangement::Instances,
+            set: bins.plane_set(),
             bins: bin_key(instances, bins, options),
         },
         None => EmitKey::Mask,

@@ -12,8 +12,8 @@ impl Count {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 
-    #[cfg(feature = "testing")]
-    fn get(&self) -> u64 {
+    #[cfg(any(feature = "testing", feature = "yardstick"))]
+    pub(crate) fn get(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
 }

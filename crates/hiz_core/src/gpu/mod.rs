@@ -16,5 +16,6 @@ pub(crate) mod made;
 pub(crate) mod numbers;
 pub(crate) mod pipelines;
 pub(crate) mod recorded_uniform;
+pub(crate) mod row_staging;
 pub(crate) mod shader;
 pub(crate) mod stage_times;

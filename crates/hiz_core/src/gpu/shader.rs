@@ -50,6 +50,11 @@ impl Source {
         Self(parts.concat())
     }
 
+    #[cfg(test)]
+    pub(crate) fn files(&self) -> &[File] {
+        &self.0
+    }
+
     /// The WGSL text of the module.
     pub(crate) fn text(&self) -> String {
         self.0.iter().map(|file| file.text).collect::<Vec<_>>().join("\n")

@@ -164,8 +164,10 @@ impl Culling {
             if output.words == 0 {
                 continue;
             }
-            for (lod, plane) in planes.chunks_exact(output.words as usize).enumerate() {
-                for (w, word) in plane.iter().enumerate() {
+            let (set, words) = (bins.plane_set(), output.words as usize);
+            for lod in 0..bins.meshes.most_lods() as usize {
+                for w in 0..words {
+                    let word = planes[set.word_at(words, lod, w)];
                     let bits = (0..32).filter(|bit| word >> bit & 1 == 1);
                     for slot in bits.map(|bit| 32 * w + bit) {
                         let index = index_of.as_ref().map_or(slot, |of| of[slot] as usize);

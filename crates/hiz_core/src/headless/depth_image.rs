@@ -7,7 +7,6 @@ use crate::gpu::depth_source::SourceKind;
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, to_u32};
 use crate::host::memory;
-use crate::host::threads::{Locked, on_threads};
 use crate::input::camera::Camera;
 use crate::input::depth::{Conversion, DepthInput};
 use crate::input::far_pixels::FarPixels;
@@ -46,6 +45,8 @@ pub struct DepthImage {
     pub(super) near_slack: NearSlack,
     /// What it tells of pixels that are far.
     pub(super) far_pixels: FarPixels,
+    /// Whether its conversion has made pixels far that may have no depth, and does not tell which.
+    pub(super) no_data_is_far: bool,
     /// How many samples of each pixel the depth is the farthest of.
     pub(super) samples: u32,
     /// The nearest of several samples.
@@ -148,6 +149,7 @@ impl DepthImage {
             tolerance: DepthTolerance::NONE,
             near_slack: NearSlack::NONE,
             far_pixels: FarPixels::BackgroundApart,
+            no_data_is_far: false,
             samples: 1,
             nearest: None,
             drawn: None,
@@ -168,6 +170,7 @@ impl DepthImage {
             tolerance: DepthTolerance::NONE,
             near_slack: NearSlack::NONE,
             far_pixels: FarPixels::BackgroundApart,
+            no_data_is_far: false,
             samples: 1,
             nearest: None,
             drawn: None,
@@ -242,43 +245,15 @@ impl DepthImage {
         engine.scoped(|| match conversion.unchanged() {
             // The numbers already are what is uploaded, so they are not copied.
             Some(ndc) => self.write(ndc, SourceKind::Bits),
-            None => {
-                let (rows, threads) = (conversion.band_rows(), conversion.threads());
-                self.write_bands(rows, threads, |first, band| conversion.rows(first, band))
-            }
+            None => self.write_converted(conversion.threads(), |first, rows| {
+                conversion.rows(first, rows);
+            }),
         })?;
         let is_unchanged = conversion.unchanged().is_some();
         let far_pixels = if is_unchanged { FarPixels::BackgroundApart } else { far_pixels(depths) };
         let (tolerance, near_slack) = (conversion.left(), conversion.near_slack());
-        Ok(Self { tolerance, near_slack, far_pixels, ..self })
-    }
-
-    /// Writes the rows that `fill` makes, which gets the first row of a band and room for it.
-    /// Each thread makes bands of rows and writes them while they are in its cache.
-    pub(super) fn write_bands(
-        &self,
-        rows_at_once: u32,
-        threads: usize,
-        fill: impl Fn(u32, &mut [f32]) + Sync,
-    ) -> Result<()> {
-        let (size, gpu) = (self.size(), &self.engine.context().gpu);
-        let pixels_of_texel = SourceKind::Bits.pixels_of_texel();
-        let bands = (0..size.height).step_by(rows_at_once as usize);
-        // One for each thread, however many bands it converts.
-        let spare_bands: Locked<Vec<Vec<f32>>> = Locked::default();
-        let failed: Locked<Option<Error>> = Locked::default();
-        on_threads(threads, bands, |first| {
-            let mut band = spare_bands.lock().pop().unwrap_or_default();
-            band.resize((rows_at_once.min(size.height - first) * size.width) as usize, 0.0);
-            fill(first, &mut band);
-            // Error scopes belong to a thread.
-            let written = gpu.checked(|_| self.write_rows(first, &band, pixels_of_texel));
-            if let Err(error) = written {
-                failed.lock().get_or_insert(error);
-            }
-            spare_bands.lock().push(band);
-        });
-        failed.lock().take().map_or(Ok(()), Err)
+        let no_data_is_far = conversion.has_lost_no_data();
+        Ok(Self { tolerance, near_slack, far_pixels, no_data_is_far, ..self })
     }
 
     /// An image in a texture of [`DepthImage::for_upload`] that is there already.
@@ -297,6 +272,7 @@ impl DepthImage {
             tolerance: DepthTolerance::NONE,
             near_slack: NearSlack::NONE,
             far_pixels: FarPixels::BackgroundApart,
+            no_data_is_far: false,
             samples: 1,
             nearest: None,
             drawn: None,
@@ -391,6 +367,7 @@ impl Engine {
                 tolerance: DepthTolerance::NONE,
                 near_slack: NearSlack::NONE,
                 far_pixels: FarPixels::BackgroundApart,
+                no_data_is_far: false,
                 samples: 1,
                 nearest: None,
                 drawn: Some(drawn),

@@ -6,9 +6,11 @@ use crate::context::HizContext;
 use crate::cull::among::Among;
 use crate::error::{Error, Result};
 use crate::gpu::copies::StagingPool;
+use crate::gpu::row_staging::RowStaging;
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
 use crate::headless::answers::Answers;
 use crate::headless::clock::Timing;
+use crate::headless::converted;
 use crate::headless::images::Images;
 use crate::headless::joined::JoinedPool;
 use crate::headless::kept_depth::KeptDepth;
@@ -82,6 +84,8 @@ struct Shared {
     clock: OnceLock<bool>,
     /// For answers that are copied by their cull's own submission.
     staging: StagingPool,
+    /// For depth that is converted on its way.
+    depth_staging: RowStaging,
     device: wgpu::Device,
     queue: wgpu::Queue,
     adapter: AdapterSummary,
@@ -178,6 +182,7 @@ impl Engine {
                 timing: Locked::default(),
                 clock: OnceLock::new(),
                 staging: StagingPool::new(STAGING_KEPT),
+                depth_staging: converted::staging(),
                 device,
                 queue,
                 adapter: summary,
@@ -246,6 +251,10 @@ impl Engine {
 
     pub(super) fn staging(&self) -> &StagingPool {
         &self.shared.staging
+    }
+
+    pub(super) fn depth_staging(&self) -> &RowStaging {
+        &self.shared.depth_staging
     }
 
     /// The buffers of the last answers.

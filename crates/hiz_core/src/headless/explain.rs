@@ -42,7 +42,11 @@ impl Culling {
         if told.verdict != Verdict::Outside {
             told.verdict = of_group;
         }
-        let how = if of_group.is_kept() { "shows" } else { "is hidden" };
+        let how = match of_group {
+            Verdict::Outside => "is outside",
+            kept if kept.is_kept() => "shows",
+            _ => "is hidden",
+        };
         told.reason = format!(
             "its group of {size} {how} as a whole ({}); by itself: {}",
             group.reason, told.reason

@@ -8,7 +8,7 @@ use crate::output::verdict::Verdict;
 
 /// Why an instance got its verdict: the cull's own steps, run for it once more.
 ///
-/// A member of a group that was hidden as a whole was never tested by itself.
+/// A member of a group that was culled as a whole was never tested by itself.
 /// Its verdict is then that of the group, which `group` explains, or outside if its own test says
 /// so.
 /// Everything else here is its own test, which may have kept it.
@@ -55,7 +55,7 @@ pub struct Explanation {
     /// Whether the instance was updated since the cull.
     /// If so, everything here is about its new bounds, and the cull's verdict may be another.
     pub stale: bool,
-    /// For a member of a group that was hidden as a whole: the test of the box around the group.
+    /// For a member of a group that was decided as a whole: the test of the box around the group.
     pub group: Option<Box<Self>>,
     /// The reason in words.
     pub reason: String,

@@ -1,6 +1,7 @@
 //! Pyramids of uploaded depth images, and their levels as arrays.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use crate::error::{Error, Result};
 use crate::headless::depth_image::DepthImage;
@@ -56,6 +57,7 @@ impl Engine {
         self.timed(&mut encoder, |encoder| {
             record_reduce(gpu, encoder, &depth.source(), &depth.camera, pyramid)
         })?;
+        pyramid.no_data_is_far.store(depth.no_data_is_far, Ordering::Relaxed);
         if let Some(drawn) = &depth.drawn {
             pyramid.keep_with_it(Arc::clone(drawn) as Arc<dyn Owner>);
         }

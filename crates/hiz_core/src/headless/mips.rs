@@ -1,12 +1,14 @@
 //! Mip textures of pyramids, and their levels as arrays.
 
+use std::sync::atomic::Ordering;
+
 use crate::error::{Error, Result};
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, to_u32};
 use crate::host::memory;
 use crate::input::image::ImageSize;
 use crate::pyramid::Pyramid;
-use crate::pyramid::mips::{MipOptions, MipTexture};
+use crate::pyramid::mips::{MipDepths, MipOptions, MipTexture};
 use crate::pyramid::mips_passes::record_mips;
 use crate::pyramid::source::DepthSource;
 
@@ -15,6 +17,8 @@ impl Engine {
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for a pyramid of another device, and for one that was never built.
+    /// - [`Error::Mismatch`] for the nearest depths of a converted image that was uploaded for
+    ///   [`Depths::Farthest`](crate::Depths::Farthest), if pixels became far that may have no depth.
     /// - Those of [`HizContext::create_mip_texture`](crate::HizContext::create_mip_texture) and
     ///   [`HizContext::record_mips`](crate::HizContext::record_mips).
     pub fn mips(&self, pyramid: &Pyramid, options: &MipOptions) -> Result<MipTexture> {
@@ -27,12 +31,28 @@ impl Engine {
                 "expected one that was built from a depth image, got one that never was",
             )
         })?;
+        if options.depths != MipDepths::Farthest && pyramid.no_data_is_far.load(Ordering::Relaxed) {
+            return Err(Error::mismatch(
+                "depths",
+                format!(
+                    "expected MipDepths::Farthest, got {:?}: the conversion of this depth image \
+                     has made pixels without a depth far, and to the nearest depth they are near; \
+                     build the pyramid with depths both",
+                    options.depths
+                ),
+            ));
+        }
         let of = &built.part.subresource;
+        // Without the farthest depths the image is that of the nearest samples.
+        let has_nearest_alone = built.part.samples > 1 && !pyramid.depths().has_farthest();
+        let nearest = built.part.nearest.as_ref().or(has_nearest_alone.then_some(&of.texture));
         let depth = DepthSource {
             mip_level: Some(of.mip_level),
             array_layer: Some(of.array_layer),
             origin: built.part.origin,
             size: Some(pyramid.size()),
+            samples: built.part.samples,
+            nearest,
             ..DepthSource::from(&of.texture)
         };
         self.scoped(|| {

@@ -1,5 +1,7 @@
 //! Pyramids of which a part is renewed: by an image that was drawn into, or by an array.
 
+use std::sync::atomic::Ordering;
+
 use crate::error::{Error, Result};
 use crate::headless::depth_image::DepthImage;
 use crate::headless::engine::Engine;
@@ -100,6 +102,8 @@ impl Engine {
             if depth.nearest.is_some() {
                 depth.record_patch(encoder, rectangle, &samples, DepthEnd::Nearest)?;
             }
+            let has_lost = samples.have_lost_no_data();
+            pyramid.no_data_is_far.fetch_or(has_lost, Ordering::Relaxed);
             Ok(())
         })
     }

@@ -46,10 +46,9 @@ impl Engine {
         let samples = Samples::new(samples, camera, (0, far_pixels(depths)))?;
         let upload = |end| {
             let image = DepthImage::for_upload(self, camera)?;
-            let first = &samples.conversions[0];
-            let (rows, threads) = (first.band_rows(), first.threads());
+            let threads = samples.conversions[0].threads();
             self.scoped(|| {
-                image.write_bands(rows, threads, |row, band| samples.rows(row, band, end))
+                image.write_converted(threads, |first, rows| samples.rows(first, rows, end))
             })?;
             Ok(image)
         };
@@ -61,6 +60,7 @@ impl Engine {
             tolerance: samples.tolerance(),
             near_slack: samples.near_slack(),
             far_pixels: far_pixels(depths),
+            no_data_is_far: samples.have_lost_no_data(),
             nearest,
             ..image
         })
@@ -101,6 +101,11 @@ impl<'a> Samples<'a> {
             relative: a.relative.max(b.relative),
             absolute: a.absolute.max(b.absolute),
         })
+    }
+
+    /// Whether a sample's conversion has lost which pixels have no depth.
+    pub(super) fn have_lost_no_data(&self) -> bool {
+        self.conversions.iter().any(Conversion::has_lost_no_data)
     }
 
     /// How near the surfaces may be: the most that any sample's may.

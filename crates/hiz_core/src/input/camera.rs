@@ -12,9 +12,13 @@ use crate::host::linear::{Mat3, Mat4, Vec3, cross, dot, inverse3, mul3, normaliz
 use crate::input::image::{DepthConvention, ImageSize, check_size};
 use crate::input::projection::{Pose, Projection};
 
+/// Rows whose w has other coefficients are scaled by a power of two.
+const SMALLEST_UNIT: f64 = 1.0 / LARGEST_UNIT;
+const LARGEST_UNIT: f64 = 18_446_744_073_709_551_616.0; // 2^64
+
 /// A view of the world: four clip-space rows about an origin, an image size and a depth convention.
 ///
-/// The camera denotes exactly these float64 numbers.
+/// The camera denotes exactly these float64 numbers, up to a factor of all rows.
 /// Everything that a cull promises is promised about them.
 ///
 /// # Examples
@@ -80,7 +84,16 @@ impl Camera {
             ));
         }
         check_regular(&rows)?;
-        Ok(Self { rows, origin, size, convention, posed: true })
+        let mut camera = Self { rows, origin, size, convention, posed: true };
+        // A factor changes no projection, but squares of extreme numbers would leave float64.
+        let unit = camera.unit_of_w();
+        if !(SMALLEST_UNIT..=LARGEST_UNIT).contains(&unit) {
+            let scaled = camera.rows_near_one();
+            if scaled.iter().flatten().all(|v| v.is_finite()) {
+                camera.rows = scaled;
+            }
+        }
+        Ok(camera)
     }
 
     /// A camera at `pose` that sees through `projection`; its rows are about the eye.
@@ -182,6 +195,8 @@ impl Camera {
     }
 
     /// The clip-space rows x, y, z, w about [`Camera::origin`].
+    ///
+    /// They are as given, up to a power of two where w's coefficients leave 2^-64 to 2^64.
     pub fn rows(&self) -> Mat4 {
         self.rows
     }
@@ -207,17 +222,22 @@ impl Camera {
     /// The scale changes no comparison.
     /// It has to come first, because products with tiny rows would lose bits below float64's range.
     pub(crate) fn rows_near_one(&self) -> Mat4 {
-        let w = self.rows[3];
-        let unit = if self.is_orthographic() {
-            w[3].abs()
-        } else {
-            w[..3].iter().fold(0.0_f64, |m, v| m.max(v.abs()))
-        };
+        let unit = self.unit_of_w();
         // log2 may be off by an ulp at a power of two.
         // w then lies marginally outside of [1, 2), which no bound depends on.
         // A subnormal unit makes the scale infinite, and rows with infinities are refused later.
         let scale = 2.0_f64.powf(unit.log2().floor()).recip();
         self.rows.map(|row| row.map(|v| v * scale))
+    }
+
+    /// w's constant for an orthographic camera, and w's largest coefficient otherwise.
+    fn unit_of_w(&self) -> f64 {
+        let w = self.rows[3];
+        if self.is_orthographic() {
+            w[3].abs()
+        } else {
+            w[..3].iter().fold(0.0_f64, |m, v| m.max(v.abs()))
+        }
     }
 
     /// The row-major float64 matrix about the world's origin, rounded: `clip = m * (x, y, z, 1)`.

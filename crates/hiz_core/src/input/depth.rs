@@ -10,6 +10,8 @@
 //!
 //! All cores share the rows of an image, and `quick` converts several pixels at once.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::error::{Error, Result};
 use crate::host::memory;
 use crate::host::rounding::ROUNDING;
@@ -162,13 +164,15 @@ pub(crate) struct Conversion<'a> {
     /// The invalid values as the image's type holds them.
     pub(super) invalid: Vec<f64>,
     tolerance: DepthTolerance,
-    world_tolerance: WorldTolerance,
+    pub(super) world_tolerance: WorldTolerance,
     /// `None` for NDC depth.
     pub(super) metric: Option<Metric>,
     /// How NDC depth is moved by the world tolerance; `None` if it is not.
     moved: Option<NdcMove>,
     /// What is told of pixels that are far.
     pub(super) far_pixels: FarPixels,
+    /// Whether a converted depth is far, where nothing more is told of it.
+    has_far: AtomicBool,
 }
 
 /// The kinds `Z` and `Distance`.
@@ -249,6 +253,7 @@ impl<'a> Conversion<'a> {
             metric,
             moved,
             far_pixels: FarPixels::Alike,
+            has_far: AtomicBool::new(false),
         })
     }
 
@@ -318,8 +323,24 @@ impl<'a> Conversion<'a> {
             DepthNumbers::F16(bits) => self.widened(first, &bits[range], of_half, out),
             DepthNumbers::U16(numbers) => self.widened(first, &numbers[range], f32::from, out),
         }
-        if self.far_pixels != FarPixels::Alike {
+        if self.far_pixels == FarPixels::Alike {
+            self.note_far(out);
+        } else {
             self.tell_apart(first, out);
+        }
+    }
+
+    /// Whether a depth that was converted is far, and nothing tells whether it is one at all.
+    pub(crate) fn has_lost_no_data(&self) -> bool {
+        self.unchanged().is_none() && self.has_far.load(Ordering::Relaxed)
+    }
+
+    fn note_far(&self, depths: &[f32]) {
+        let far = self.convention.far();
+        if !self.has_far.load(Ordering::Relaxed)
+            && depths.iter().fold(false, |f, d| f | (*d == far))
+        {
+            self.has_far.store(true, Ordering::Relaxed);
         }
     }
 
@@ -332,12 +353,11 @@ impl<'a> Conversion<'a> {
     /// Converts rows of 16 bits, which `read` turns into float32.
     fn widened(&self, first: u32, stored: &[u16], read: impl Fn(u16) -> f32, out: &mut [f32]) {
         let (width, invalid) = (self.size.width as usize, self.narrow_invalid());
-        let mut numbers = vec![0.0; width];
+        let mut numbers = Vec::with_capacity(width);
         let rows = stored.chunks_exact(width).zip(out.chunks_exact_mut(width));
         for (row, (stored, out)) in (first..).zip(rows) {
-            for (number, stored) in numbers.iter_mut().zip(stored) {
-                *number = read(*stored);
-            }
+            numbers.clear();
+            numbers.extend(stored.iter().map(|stored| read(*stored)));
             self.convert(row, &numbers, &invalid, out);
         }
     }
@@ -374,7 +394,7 @@ impl<'a> Conversion<'a> {
     }
 
     /// The NDC depth of one number, by the bounds of its own pixel.
-    fn exact(&self, metric: &Metric, column: u32, row: u32, number: f64) -> f32 {
+    pub(super) fn exact(&self, metric: &Metric, column: u32, row: u32, number: f64) -> f32 {
         let Metric { kind, lens, .. } = metric;
         let Some((value, off)) = self.value_of(metric, number) else {
             return self.convention.far();

@@ -1,7 +1,8 @@
 //! What an upload tells of pixels whose depth is far: for the nearest end of a pyramid.
 //!
 //! For the farthest end all of them are far, and nothing has to be told.
-//! The nearest end counts what is no depth as near, and receivers leave out background.
+//! The nearest end counts what is no depth as near, and background as far.
+//! Receivers leave out background.
 
 use crate::input::image::DepthConvention;
 use crate::input::tolerance::DepthTolerance;
@@ -13,10 +14,15 @@ pub(crate) enum FarPixels {
     Alike,
     /// What is no depth is NaN, and far is background: a measured depth is never exactly far.
     ///
+    /// Background of the kinds `Z` and `Distance` is infinity, and what is surely beyond the far
+    /// plane.
+    ///
     /// With reversed Z it stops at 2^-126 instead.
     /// With standard Z it counts as no depth, so that the farthest end is what it was.
     NoDepthApart,
     /// The same, but a measured depth stops one float short of far with standard Z, too.
+    ///
+    /// Background of the kinds `Z` and `Distance` is NaN: it may be a receiver of shadows.
     BackgroundApart,
 }
 

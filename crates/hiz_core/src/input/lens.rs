@@ -16,6 +16,17 @@ pub(super) struct Lens {
     pub(super) rays: Rays,
 }
 
+/// Where the depth of a number lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    /// It may lie between the planes, and surely not in front of the near plane.
+    Inside,
+    /// Surely beyond the far plane.
+    Beyond,
+    /// It may lie in front of the near plane, or nothing is known.
+    Unknown,
+}
+
 pub(super) enum Rays {
     /// Rays through an eye.
     ///
@@ -65,20 +76,27 @@ impl Lens {
         toward_far_by(depth, lost, self.reversed)
     }
 
-    /// Whether the depth of the same number may lie between the planes, where it surely does not lie
-    /// in front of the near plane.
-    pub(super) fn may_lie_inside(
-        &self,
-        column: u32,
-        row: u32,
-        value: (f64, f64),
-        kind: DepthKind,
-    ) -> bool {
+    /// Where the depth of the same number lies, as near as its error lets it be.
+    pub(super) fn place(&self, column: u32, row: u32, value: (f64, f64), kind: DepthKind) -> Place {
         let (depth, lost) = self.depth(column, row, value, kind);
-        if self.reversed {
-            (0.0..=1.0).contains(&(depth + lost))
+        let nearest = if self.reversed { depth + lost } else { depth - lost };
+        let is_beyond = if self.reversed { nearest < 0.0 } else { nearest > 1.0 };
+        if is_beyond {
+            Place::Beyond
+        } else if (0.0..=1.0).contains(&nearest) {
+            Place::Inside
         } else {
-            (0.0..=1.0).contains(&(depth - lost))
+            Place::Unknown
+        }
+    }
+
+    /// Whether depth becomes farther with distance, so that infinity is farther than everything.
+    ///
+    /// A bare matrix may contradict its convention.
+    pub(super) fn grows_to_far(&self) -> bool {
+        match &self.rays {
+            Rays::Parallel { slope, .. } => (*slope < 0.0) == self.reversed,
+            Rays::FromEye { constant, .. } => (*constant > 0.0) == self.reversed,
         }
     }
 

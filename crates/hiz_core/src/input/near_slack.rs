@@ -7,7 +7,7 @@ use crate::host::rounding::{EPS, ROUNDING, round_up};
 use crate::input::depth_kind::DepthKind;
 use crate::input::image::DepthConvention;
 use crate::input::lens::{Lens, Rays};
-use crate::input::quick::length_share;
+use crate::input::quick::quotient_share;
 use crate::input::tolerance::DepthTolerance;
 
 /// How near the surface may be that a stored depth stands for.
@@ -130,7 +130,7 @@ pub(super) fn of_metric(
         Rays::FromEye { k, constant, k_error, constant_error, w_length, .. } => {
             let quotient = constant / (w_length * scale);
             let share =
-                16.0 * ROUNDING + constant_error / constant.abs() + length_share(lens, kind);
+                16.0 * ROUNDING + constant_error / constant.abs() + quotient_share(lens, kind);
             let size: f64 = k.iter().map(|v| v.abs()).sum();
             // Q is at most 1 + |base|, and the ray's length at least 1.
             let near_number = 2.0 * (1.0 + size) / quotient.abs();
@@ -258,5 +258,33 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Quotients of float32 lose more than one rounding, and the slack covers all of it.
+    #[test]
+    fn quotients_of_float32_are_covered() {
+        let camera = &cameras(DepthConvention::Reversed)[0];
+        let numbers: Vec<f32> =
+            (0..SIZE.pixels()).map(|i| 0.102 * 1.0113_f32.powi(i as i32)).collect();
+        let depth = DepthInput {
+            numbers: Floats::F32(&numbers).into(),
+            kind: DepthKind::Z,
+            scale: 1.0,
+            invalid: &[],
+            tolerance: DepthTolerance::NONE,
+            world_tolerance: WorldTolerance::NONE,
+        };
+        let conversion = Conversion::new(&depth, camera).unwrap();
+        let (slack, rounding) = (conversion.near_slack(), NearSlack::of_rounding(true));
+        let mut stored = vec![0.0; numbers.len()];
+        conversion.rows(0, &mut stored);
+        let mut beyond_rounding = 0;
+        for (number, stored) in numbers.iter().zip(&stored) {
+            let (truth, stored) = (ndc(0, f64::from(*number), true), f64::from(*stored));
+            assert!(stored <= truth && truth <= slack.slope * stored + slack.offset, "{number}");
+            beyond_rounding += usize::from(truth > rounding.slope * stored + rounding.offset);
+        }
+        assert!(beyond_rounding > 100, "{beyond_rounding}");
+        assert!(slack.slope < 1.0 + 1e-6, "{slack:?}");
     }
 }

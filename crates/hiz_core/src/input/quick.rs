@@ -10,6 +10,8 @@
 //! Close to the near plane the bounds cannot tell on which side of it a number lies.
 //! A segment of a row with such a number takes the long way, too.
 
+use std::ops::Range;
+
 use crate::host::linear::{Vec3, dot};
 use crate::host::rounding::ROUNDING;
 use crate::input::depth_kind::DepthKind;
@@ -45,6 +47,9 @@ const MOST_LOST_IN_NARROW: f64 = 1e-7;
 /// The largest depth that does not depend on the number, for images of float64.
 /// Where the near plane leans, the long way loses less in most pixels.
 const MOST_BASE_IN_WIDE: f64 = 4.0;
+
+/// What is below this changes no depth above 2^-126, beside all that a quotient's share counts.
+const NO_BASE: f64 = 1e-200;
 
 /// A number of an image: float32 or float64.
 pub(super) trait Number: Copy + PartialOrd + Into<f64> {
@@ -90,6 +95,8 @@ enum Form {
         numerator: f64,
         moved: f64,
         length: Option<RayLength>,
+        /// Whether the quotient is taken in float32, where its accuracy will do.
+        is_narrow: bool,
     },
     /// `constant + slope * number`, moved by `share` of the product.
     Parallel { constant: f64, slope: f64, share: f64 },
@@ -103,8 +110,8 @@ enum Form {
 struct RayLength {
     /// x of the columns' centres.
     columns: Vec<f64>,
-    /// The same in float32, where its accuracy will do.
-    narrow_columns: Option<Vec<f32>>,
+    /// The same in float32, for quotients that are taken in it.
+    narrow_columns: Vec<f32>,
     square: f64,
     /// `x0 = towards . (y, 1)`.
     towards: [f64; 2],
@@ -190,7 +197,7 @@ impl Quick {
         numbers: &[T],
         out: &mut [f32],
     ) {
-        let (of_columns, of_row, numerator, moved, length) = match &self.form {
+        let (of_columns, of_row, numerator, moved, length, is_narrow) = match &self.form {
             Form::Parallel { constant, slope, share } => {
                 for (out, number) in out.iter_mut().zip(numbers) {
                     let product = slope * (*number).into();
@@ -198,13 +205,22 @@ impl Quick {
                 }
                 return;
             }
-            Form::FromEye { of_columns, of_row, numerator, moved, length } => {
-                (of_columns, of_row[0] * y + of_row[1], *numerator, *moved, length)
+            Form::FromEye { of_columns, of_row, numerator, moved, length, is_narrow } => {
+                (of_columns, of_row[0] * y + of_row[1], *numerator, *moved, length, *is_narrow)
             }
         };
         let range = first..first + numbers.len();
         let of_columns =
             of_columns.as_ref().map_or(&ZEROS[..numbers.len()], |all| &all[range.clone()]);
+        if is_narrow {
+            narrow_quotients(range, y, [numerator, moved], length.as_ref(), numbers, out);
+            if self.has_base() {
+                for (out, column) in out.iter_mut().zip(of_columns) {
+                    *out = rounded::<REVERSED>((column + of_row) + f64::from(*out));
+                }
+            }
+            return;
+        }
         let Some(length) = length else {
             for ((out, number), column) in out.iter_mut().zip(numbers).zip(of_columns) {
                 let number: f64 = (*number).into();
@@ -214,28 +230,12 @@ impl Quick {
         };
         let (x0, rest) = length.of_row(y);
         let square = length.square;
-        let Some(narrow_columns) = &length.narrow_columns else {
-            let columns = of_columns.iter().zip(&length.columns[range]);
-            for ((out, number), (column, x)) in out.iter_mut().zip(numbers).zip(columns) {
-                let number: f64 = (*number).into();
-                let from = x - x0;
-                let quotient =
-                    numerator * (square * (from * from) + rest).sqrt() / (number + moved);
-                *out = rounded::<REVERSED>((column + of_row) + quotient);
-            }
-            return;
-        };
-        let [x0, rest, square, numerator, moved] =
-            [x0, rest, square, numerator, moved].map(narrowed);
-        for ((out, number), x) in out.iter_mut().zip(numbers).zip(&narrow_columns[range]) {
-            let number = narrowed((*number).into());
+        let columns = of_columns.iter().zip(&length.columns[range]);
+        for ((out, number), (column, x)) in out.iter_mut().zip(numbers).zip(columns) {
+            let number: f64 = (*number).into();
             let from = x - x0;
-            *out = numerator * (square * (from * from) + rest).sqrt() / (number + moved);
-        }
-        if self.has_base() {
-            for (out, column) in out.iter_mut().zip(of_columns) {
-                *out = rounded::<REVERSED>((column + of_row) + f64::from(*out));
-            }
+            let quotient = numerator * (square * (from * from) + rest).sqrt() / (number + moved);
+            *out = rounded::<REVERSED>((column + of_row) + quotient);
         }
     }
 
@@ -260,6 +260,31 @@ impl Quick {
                 *out = if *number == *bad { far } else { *out };
             }
         }
+    }
+}
+
+/// The quotients of a segment in float32; `lost_in_single` bounds their errors.
+fn narrow_quotients<T: Number>(
+    range: Range<usize>,
+    y: f64,
+    [numerator, moved]: [f64; 2],
+    length: Option<&RayLength>,
+    numbers: &[T],
+    out: &mut [f32],
+) {
+    let [numerator, moved] = [numerator, moved].map(narrowed);
+    let Some(length) = length else {
+        for (out, number) in out.iter_mut().zip(numbers) {
+            *out = numerator / (narrowed((*number).into()) + moved);
+        }
+        return;
+    };
+    let (x0, rest) = length.of_row(y);
+    let [x0, rest, square] = [x0, rest, length.square].map(narrowed);
+    for ((out, number), x) in out.iter_mut().zip(numbers).zip(&length.narrow_columns[range]) {
+        let number = narrowed((*number).into());
+        let from = x - x0;
+        *out = numerator * (square * (from * from) + rest).sqrt() / (number + moved);
     }
 }
 
@@ -337,9 +362,13 @@ fn from_eye(
     if share.is_nan() || share > most {
         return None;
     }
+    // Without a base, the far plane is infinitely far.
+    let has_base = has_base(lens);
     let has_narrow_move = tolerance.absolute > 1e-30;
-    let narrow = length.as_ref().map(|length| length.lost_in_single(has_narrow_move));
-    let narrow = narrow.filter(|lost| !is_wide && *lost < 1e-5);
+    // Beside a base, which takes float64, a float32 quotient of view depth gains little.
+    let may_be_narrow = !is_wide && (length.is_some() || !has_base);
+    let narrow = may_be_narrow.then(|| lost_in_single(length.as_ref(), has_narrow_move));
+    let narrow = narrow.filter(|lost| *lost < 1e-5);
     // Quotients between these stay normal float32 wherever they count.
     let narrow = narrow.filter(|_| (1e-15..1e15).contains(&quotient.abs()));
     share += narrow.unwrap_or(0.0);
@@ -372,34 +401,43 @@ fn from_eye(
     let beyond =
         (1.0 + 2.0 * share + absolute) * (1.0 + relative) / (1.0 - relative) + absolute - 1.0;
     let margin = 2.0 * lost + (1.0 + base) * (5.0 * share + beyond / (1.0 + beyond) * (1.0 + 1e-9));
-    let length = length.map(|length| match narrow {
-        Some(_) => length.narrowed(),
-        None => length,
-    });
     let base_far = if lens.reversed { k[2] - lost } else { k[2] + lost };
     let leaning = k[0].abs() + k[1].abs();
     // Numbers that are no depth give less than the depth of an infinite one, infinity or NaN.
     let knows_depth =
         if lens.reversed { base_far + leaning <= 0.0 } else { base_far - leaning >= 1.0 };
-    // Without a base, the far plane is infinitely far; then no more than a subnormal is lost.
-    let has_base = !(lens.reversed && *k == [0.0; 3] && *k_error == [0.0; 3]);
     let form = Form::FromEye {
         of_columns: has_base.then(|| columns.iter().map(|x| k[0] * x).collect()),
         of_row: if has_base { [k[1], base_far] } else { [0.0; 2] },
         numerator: if narrow.is_some() { toward_zero(numerator) } else { numerator },
         moved,
         length,
+        is_narrow: narrow.is_some(),
     };
     Some((form, margin, knows_depth))
 }
 
-/// The share of a quotient that the length of its ray may lose, in float64 and in float32.
-pub(super) fn length_share(lens: &Lens, kind: DepthKind) -> f64 {
+/// Whether something is added to quotients: not so with an infinite far plane in reversed Z.
+/// Then no more than a subnormal is lost beside the quotient.
+///
+/// Error bounds are never 0, since products may underflow.
+fn has_base(lens: &Lens) -> bool {
+    match &lens.rays {
+        Rays::FromEye { k, k_error, .. } => {
+            !(lens.reversed && *k == [0.0; 3] && k_error.iter().all(|error| *error < NO_BASE))
+        }
+        Rays::Parallel { .. } => true,
+    }
+}
+
+/// The share of a quotient that the length of its ray and float32 may lose.
+pub(super) fn quotient_share(lens: &Lens, kind: DepthKind) -> f64 {
     match &lens.rays {
         Rays::FromEye { inverse, w_length, .. } if kind == DepthKind::Distance => {
             let (length, lost) = RayLength::new(inverse, *w_length, lens.size[0]);
-            lost + length.lost_in_single(true)
+            lost + lost_in_single(Some(&length), true)
         }
+        Rays::FromEye { .. } if !has_base(lens) => lost_in_single(None, true),
         _ => 0.0,
     }
 }
@@ -421,7 +459,8 @@ impl RayLength {
         let off = inverse.as_flattened().iter().map(|entry| entry.1).sum::<f64>() * w_length;
         let lost = 64.0 * ROUNDING * longest * longest + 1.01 * off;
         let columns = columns(width);
-        let this = Self { columns, narrow_columns: None, square, towards, across, ahead };
+        let narrow_columns = columns.iter().copied().map(narrowed).collect();
+        let this = Self { columns, narrow_columns, square, towards, across, ahead };
         (this, lost)
     }
 
@@ -432,22 +471,20 @@ impl RayLength {
         // Never below 1 but for roundings.
         (x0, (dot(ray, ray) - self.square * x0 * x0).max(1.0))
     }
+}
 
-    /// A bound of the relative error of the quotient in float32.
-    fn lost_in_single(&self, has_move: bool) -> f64 {
-        // Of the square of the length: `square`, the square of x - x0, their product and the sum.
-        // The root halves the sum of these, and of what x, x0 and their difference lose.
-        let farthest = 1.0 + self.towards[0].abs() + self.towards[1].abs();
-        let of_length = 2.0 + self.square.sqrt() * farthest;
-        // The root, its product and the quotient; `moved` and its sum.
-        let of_quotient = 3.0 + if has_move { 2.0 } else { 0.0 };
-        (of_length + of_quotient) * SINGLE * (1.0 + 1e-3)
-    }
-
-    fn narrowed(self) -> Self {
-        let narrow_columns = Some(self.columns.iter().copied().map(narrowed).collect());
-        Self { narrow_columns, ..self }
-    }
+/// A bound of the relative error of the quotient in float32.
+fn lost_in_single(length: Option<&RayLength>, has_move: bool) -> f64 {
+    // Of the square of the length: `square`, the square of x - x0, their product and the sum.
+    // The root halves the sum of these, and of what x, x0 and their difference lose.
+    // Then the root itself and its product.
+    let of_length = length.map_or(0.0, |length| {
+        let farthest = 1.0 + length.towards[0].abs() + length.towards[1].abs();
+        4.0 + length.square.sqrt() * farthest
+    });
+    // The quotient; `moved` and its sum.
+    let of_quotient = 1.0 + if has_move { 2.0 } else { 0.0 };
+    (of_length + of_quotient) * SINGLE * (1.0 + 1e-3)
 }
 
 #[inline(always)]
@@ -543,11 +580,13 @@ mod tests {
 
     type Fault = fn(&mut Quick);
 
+    const OTHER_SIDE: &str = "rounded to the other side";
+
     /// Each fault must show as a depth that is nearer than the exact one.
     const FAULTS: [(&str, DepthKind, Fault); 5] = [
         ("a numerator that is moved towards near", DepthKind::Z, |quick| {
             if let Form::FromEye { numerator, .. } = &mut quick.form {
-                *numerator *= 1.0 + 2e-7;
+                *numerator *= 1.0 + 8.0 * SINGLE;
             }
         }),
         ("float32 that is off by more than its bound", DepthKind::Distance, |quick| {
@@ -555,7 +594,7 @@ mod tests {
                 *numerator *= 1.0 + 16.0 * SINGLE;
             }
         }),
-        ("rounded to the other side", DepthKind::Z, |quick| quick.reversed = !quick.reversed),
+        (OTHER_SIDE, DepthKind::Z, |quick| quick.reversed = !quick.reversed),
         ("rays a little too long", DepthKind::Distance, |quick| {
             if let Form::FromEye { length: Some(length), .. } = &mut quick.form {
                 // A longer ray is a larger quotient, which is nearer.
@@ -585,7 +624,12 @@ mod tests {
                             println!("{convention:?} {far:?} {kind:?} {is_wide}: {least}..{most}");
                             assert!(least >= 0, "{convention:?} {far:?} {kind:?}: nearer");
                             // A step is smaller where the far plane is close.
-                            let few = if kind == DepthKind::Z || is_wide { 1 } else { 60 };
+                            let few = match kind {
+                                _ if is_wide => 1,
+                                DepthKind::Z if has_base(&lens) => 1,
+                                DepthKind::Z => 6,
+                                _ => 60,
+                            };
                             assert!(most <= few, "{convention:?} {far:?} {kind:?}: {most}");
                         }
                     }
@@ -594,22 +638,42 @@ mod tests {
         }
     }
 
+    /// Nothing is added to quotients of the commonest cameras.
+    #[test]
+    fn an_infinite_far_plane_in_reversed_z_has_no_base() {
+        for (convention, far, expected) in [
+            (DepthConvention::Reversed, None, false),
+            (DepthConvention::Reversed, Some(1000.0), true),
+            (DepthConvention::Standard, None, true),
+        ] {
+            let lens = Lens::new(&camera(convention, far)).unwrap();
+            let quick = Quick::new(&lens, DepthKind::Z, 1.0, DepthTolerance::NONE, false).unwrap();
+            assert_eq!(quick.has_base(), expected, "{convention:?} {far:?}");
+        }
+    }
+
     #[test]
     fn planted_faults_show() {
         for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
-            let camera = camera(convention, None);
-            let lens = Lens::new(&camera).unwrap();
-            for (what, kind, plant) in FAULTS {
+            for far in [None, Some(1000.0)] {
+                let camera = camera(convention, far);
+                let lens = Lens::new(&camera).unwrap();
                 let tolerance = DepthTolerance::SINGLE;
-                let mut quick = Quick::new(&lens, kind, 1.0, tolerance, false).unwrap();
-                plant(&mut quick);
-                let [least, _] = steps(&camera, kind, tolerance, &quick);
-                assert!(least < 0, "{convention:?}, {what}: {least}");
+                for (what, kind, plant) in FAULTS {
+                    if what == OTHER_SIDE && !has_base(&lens) {
+                        continue; // nothing is rounded after the quotient
+                    }
+                    let mut quick = Quick::new(&lens, kind, 1.0, tolerance, false).unwrap();
+                    plant(&mut quick);
+                    let [least, _] = steps(&camera, kind, tolerance, &quick);
+                    assert!(least < 0, "{convention:?} {far:?}, {what}: {least}");
+                }
+                // Without the tolerance of the image's numbers.
+                let (kind, none) = (DepthKind::Z, DepthTolerance::NONE);
+                let quick = Quick::new(&lens, kind, 1.0, none, false).unwrap();
+                let [least, _] = steps(&camera, kind, DepthTolerance::HALF, &quick);
+                assert!(least < 0, "{convention:?} {far:?}: the tolerance");
             }
-            // Without the tolerance of the image's numbers.
-            let quick = Quick::new(&lens, DepthKind::Z, 1.0, DepthTolerance::NONE, false).unwrap();
-            let [least, _] = steps(&camera, DepthKind::Z, DepthTolerance::SINGLE, &quick);
-            assert!(least < 0, "{convention:?}: the tolerance");
         }
     }
 

@@ -14,6 +14,10 @@ use crate::input::lens::toward_far;
 /// Points that one thread takes at a time.
 const PART: usize = 1 << 14;
 
+/// Weights beyond these are as good as these, and sums of them stay within float32.
+const LEAST: f64 = 1e-18;
+const MOST: f64 = 1e18;
+
 /// Nanoseconds that a point takes, about.
 const PER_POINT: u64 = 20;
 
@@ -39,6 +43,13 @@ impl Projector {
     fn new(camera: &Camera) -> Self {
         let size = [camera.size().width, camera.size().height].map(f64::from);
         Self { rows: camera.rows(), origin: camera.origin(), size }
+    }
+
+    /// View depth is w times this, because the rows may have any factor.
+    fn depth_per_w(&self) -> f64 {
+        let [x, y, z, constant] = self.rows[3];
+        let along = (x * x + y * y + z * z).sqrt();
+        if along > 0.0 { along.recip() } else { constant.recip() }
     }
 
     /// `None` behind the eye, and for what is not finite.
@@ -126,7 +137,9 @@ impl Colours<'_> {
 pub enum ColourWeight {
     /// All alike.
     Equal,
-    /// By 1 / w^2, as the point's surface fills the image.
+    /// By the inverse square of the view depth, as the point's surface fills the image.
+    ///
+    /// Parallel rays show everything alike, so there each point counts 1.
     Near,
 }
 
@@ -169,6 +182,7 @@ pub fn add_colours(
         }
     }
     let projector = Projector::new(camera);
+    let depth_per_w = projector.depth_per_w();
     let parts = (0..)
         .step_by(PART)
         .zip(visible.chunks(PART))
@@ -186,7 +200,7 @@ pub fn add_colours(
             #[expect(clippy::cast_possible_truncation, reason = "a weight")]
             let share = match weight {
                 ColourWeight::Equal => 1.0,
-                ColourWeight::Near => (p.w * p.w).recip() as f32,
+                ColourWeight::Near => (p.w * depth_per_w).powi(2).recip().clamp(LEAST, MOST) as f32,
             };
             for (sum, channel) in colours[3 * k..3 * k + 3].iter_mut().zip(colour) {
                 *sum += share * channel;

@@ -23,7 +23,7 @@ pub(crate) const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
 /// The centre in the record of an absent instance, on the first axis.
 ///
 /// It is farther from every reference point than a valid centre can be.
-/// The shader asks for a centre below half of it (`shaders/cull/classify.wgsl`, `ABSENT_BELOW`).
+/// The shader asks for a centre below half of it (`shaders/cull/decision.wgsl`, `ABSENT_BELOW`).
 pub(crate) const ABSENT_CENTER: f32 = -BEYOND_LIMITS;
 
 pub(super) trait Record: bytemuck::Pod {

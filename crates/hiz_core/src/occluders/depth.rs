@@ -1,10 +1,9 @@
 //! A depth image that occluders are drawn into, by the rasteriser that suits the device.
 
 use crate::error::{Error, Result};
-use crate::gpu::buffers::Mapped;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::{ContextId, Gpu};
-use crate::gpu::kept::Ring;
+use crate::gpu::row_staging::RowStaging;
 use crate::host::threads::{Locked, cores};
 use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
@@ -66,7 +65,7 @@ pub struct OccluderDepth {
     /// The image of the rasteriser on the host, if that one draws.
     host: Option<Locked<HostImage>>,
     /// Buffers through which rows come to the texture.
-    staging: Ring,
+    staging: RowStaging,
     /// Held from the recording to the submit by those who submit, so that drawings keep their order.
     pub(crate) submitting: Locked<()>,
 }
@@ -121,7 +120,7 @@ impl OccluderDepth {
             texture,
             view,
             host,
-            staging: Ring::new(STAGING_KEPT),
+            staging: RowStaging::new("hiz.occluders.staging", 1, STAGING_KEPT, u64::MAX),
             submitting: Locked::default(),
         })
     }
@@ -218,44 +217,9 @@ impl OccluderDepth {
         convention: DepthConvention,
         rows: std::ops::Range<u32>,
     ) -> Result<()> {
-        const LABEL: &str = "hiz.occluders.staging";
-        let texels = self.texture.width();
-        let bytes_per_row = (16 * texels).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let bytes = u64::from(bytes_per_row) * u64::from(self.size.height);
-        let staging = match self.staging.take() {
-            Some(free) => free,
-            None => {
-                let usage = wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC;
-                gpu.mapped(LABEL, bytes, usage)?
-            }
-        };
-        let mapped = Mapped::of(LABEL, &staging);
-        let pitch = bytes_per_row as usize;
-        raster.write_rows(|part| mapped.range(part), pitch, convention, &rows)?;
-        staging.unmap();
-        gpu.recorded(|| {
-            encoder.copy_buffer_to_texture(
-                wgpu::TexelCopyBufferInfo {
-                    buffer: &staging,
-                    layout: wgpu::TexelCopyBufferLayout {
-                        offset: 0,
-                        bytes_per_row: Some(bytes_per_row),
-                        rows_per_image: None,
-                    },
-                },
-                wgpu::TexelCopyTextureInfo {
-                    origin: wgpu::Origin3d { x: 0, y: rows.start, z: 0 },
-                    ..self.texture.as_image_copy()
-                },
-                wgpu::Extent3d {
-                    width: texels,
-                    height: rows.end - rows.start,
-                    depth_or_array_layers: 1,
-                },
-            );
-            Ok(())
-        })?;
-        self.staging.come_back(encoder, &staging);
-        Ok(())
+        let part = (&self.texture, rows.clone(), self.size.height);
+        self.staging.record(gpu, encoder, part, |mapped, pitch| {
+            raster.write_rows(|part| mapped.range(part), pitch, convention, &rows)
+        })
     }
 }

@@ -12,8 +12,49 @@ use crate::output::emit::{Emit, Placement};
 use crate::output::lists::{CANARY_WORDS, filled_list};
 use crate::output::mesh_table::{MeshTable, TemplateRecord};
 
-/// Words of the planes that one workgroup of `emit_block` counts; `shaders/output/emit.wgsl`.
+/// Words of a set of planes that one workgroup of `emit_block` counts;
+/// `shaders/output/emit_planes.wgsl`.
 pub(crate) const BLOCK_WORDS: u32 = 1024;
+
+/// How many bit planes lie side by side in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum PlaneSet {
+    /// `shaders/output/planes_one.wgsl`.
+    One,
+    /// `shaders/output/planes_four.wgsl`.
+    Four,
+}
+
+impl PlaneSet {
+    /// For meshes of up to this many levels of detail.
+    pub(crate) fn of_lods(lods: u32) -> Self {
+        if lods == 1 { Self::One } else { Self::Four }
+    }
+
+    /// Planes of a set.
+    pub(crate) fn planes(self) -> u32 {
+        match self {
+            Self::One => 1,
+            Self::Four => 4,
+        }
+    }
+
+    /// The number of sets for so many levels of detail.
+    pub(crate) fn sets(self, lods: u32) -> u32 {
+        lods.div_ceil(self.planes())
+    }
+
+    /// Words of the counts of a set, which are below 2^16; `Packed` in the shaders.
+    fn packed_words(self) -> u32 {
+        self.planes().div_ceil(2)
+    }
+
+    /// Where a word of a plane stands, if planes have `words` words.
+    pub(crate) fn word_at(self, words: usize, lod: usize, word: usize) -> usize {
+        let planes = self.planes() as usize;
+        (lod / planes * words + word) * planes + lod % planes
+    }
+}
 
 /// Twin: `shaders/output/emit.wgsl`, `Emit`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -44,7 +85,7 @@ pub(crate) struct BinRecord {
     pub(crate) begin: u32,
     pub(crate) count: u32,
     pub(crate) shift: u32,
-    pub(crate) padding: u32,
+    pub(crate) filled: u32,
 }
 
 /// How the kept instances are arranged.
@@ -61,7 +102,7 @@ pub(crate) enum Arrangement {
 pub(crate) struct PieceBins {
     /// `None` if no list was asked for.
     pub(crate) list: Option<wgpu::Buffer>,
-    /// A plane per LOD, each with a bit per slot or per index.
+    /// A plane per LOD, each with a bit per slot or per index, in sets ([`PlaneSet`]).
     pub(crate) planes: wgpu::Buffer,
     /// Scratch: how many bits are set before each word, and before each block of words.
     pub(crate) before: wgpu::Buffer,
@@ -178,6 +219,16 @@ impl Bins {
         }))
     }
 
+    /// How the planes lie in memory.
+    pub(crate) fn plane_set(&self) -> PlaneSet {
+        PlaneSet::of_lods(self.meshes.most_lods())
+    }
+
+    /// How many sets of planes there are.
+    pub(crate) fn sets(&self) -> u32 {
+        self.plane_set().sets(self.meshes.most_lods())
+    }
+
     /// Bytes from one piece's draw records to the next.
     pub(crate) fn piece_bytes(&self) -> u64 {
         u64::from(self.stride) * record_bytes(&self.meshes)
@@ -258,8 +309,11 @@ impl PieceBins {
         uniform: &EmitUniform,
         list_words: Option<u64>,
     ) -> Result<Self> {
-        let words = u64::from(uniform.words * uniform.lods).max(1);
-        let blocks = words.div_ceil(BLOCK_WORDS.into()) + 1;
+        let set = PlaneSet::of_lods(uniform.lods);
+        let sets = set.sets(uniform.lods);
+        let words = u64::from(uniform.words.max(1) * sets);
+        let blocks = u64::from((uniform.words.div_ceil(BLOCK_WORDS) + 1) * sets);
+        let of_set = 4 * u64::from(set.planes());
         let bins = u64::from(meshes.len() * meshes.most_lods());
         // Meshes that no instance has, at the end of the table, begin where the last one ends.
         let mut starts = match &piece.slots {
@@ -272,9 +326,13 @@ impl PieceBins {
         let bins_bytes = bins * size_of::<BinRecord>() as u64;
         Ok(Self {
             list,
-            planes: gpu.empty("hiz.bins.planes", 4 * words, STORAGE)?,
-            before: gpu.empty("hiz.bins.before", 4 * words, STORAGE)?,
-            blocks: gpu.empty("hiz.bins.blocks", 4 * blocks, STORAGE)?,
+            planes: gpu.empty("hiz.bins.planes", of_set * words, STORAGE)?,
+            before: gpu.empty(
+                "hiz.bins.before",
+                4 * u64::from(set.packed_words()) * words,
+                STORAGE,
+            )?,
+            blocks: gpu.empty("hiz.bins.blocks", of_set * blocks, STORAGE)?,
             bins: gpu.empty("hiz.bins.ranges", bins_bytes, STORAGE)?,
             starts_buffer: gpu.filled(
                 "hiz.bins.starts",

@@ -13,6 +13,7 @@ use crate::gpu::shader::{Source, wgsl};
 use crate::instances::Instances;
 use crate::instances::piece::Piece;
 use crate::output::bins::{Arrangement, Bins};
+use crate::output::emit_passes;
 use crate::output::lists::Lists;
 use crate::output::visible::{PieceOutput, Visible};
 
@@ -38,15 +39,11 @@ pub(crate) fn cut_module() -> Source {
     Source::of(&[&[wgsl!("instances/piece"), wgsl!("output/cut")]])
 }
 
-/// The shader of the cut of bins.
-pub(crate) fn emit_cut_module() -> Source {
-    Source::of(&[&[wgsl!("instances/piece"), wgsl!("output/emit"), wgsl!("output/emit_cut")]])
-}
-
 /// The dispatches that cut the masks of all pieces.
 pub(crate) struct Cut {
     pipeline: wgpu::ComputePipeline,
-    pieces: Vec<(wgpu::BindGroup, u32)>,
+    /// The bindings of each piece, its words, and its sets of planes.
+    pieces: Vec<(wgpu::BindGroup, [u32; 2])>,
 }
 
 impl Cut {
@@ -66,8 +63,8 @@ impl Cut {
             let cut =
                 |(p, ((piece, output), bound)): (usize, ((&Piece, &PieceOutput), &OnceLock<_>))| {
                     let bound = made(bound, || bind_bins(gpu, piece, output, (bins, p)))?;
-                    let planes = if is_by_index(bins) { 1 } else { bins.meshes.most_lods() };
-                    Ok((bound.clone(), piece.words() * planes))
+                    let sets = if is_by_index(bins) { 1 } else { bins.sets() };
+                    Ok((bound.clone(), [piece.words(), sets]))
                 };
             let is_sorted = instances.pieces.iter().any(|piece| piece.slots.is_some());
             (bins_pipeline(gpu, bins, is_sorted)?, pieces.map(cut).collect::<Result<_>>()?)
@@ -75,7 +72,7 @@ impl Cut {
             let cut =
                 |(p, ((piece, output), bound)): (usize, ((&Piece, &PieceOutput), &OnceLock<_>))| {
                     let bound = made(bound, || bind_list(gpu, piece, output, (lists, p)))?;
-                    Ok((bound.clone(), piece.words()))
+                    Ok((bound.clone(), [piece.words(), 1]))
                 };
             (list_pipeline(gpu)?, pieces.map(cut).collect::<Result<_>>()?)
         } else {
@@ -87,9 +84,9 @@ impl Cut {
     /// Records the cut, behind what has counted the bits.
     pub(crate) fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
         pass.set_pipeline(&self.pipeline);
-        for (bindings, words) in &self.pieces {
+        for (bindings, [words, sets]) in &self.pieces {
             pass.set_bind_group(0, bindings, &[]);
-            pass.dispatch_workgroups(words.div_ceil(CUT_WORKGROUP), 1, 1);
+            pass.dispatch_workgroups(words.div_ceil(CUT_WORKGROUP), *sets, 1);
         }
     }
 }
@@ -111,7 +108,7 @@ fn list_pipeline(gpu: &Gpu) -> Result<wgpu::ComputePipeline> {
 fn bins_pipeline(gpu: &Gpu, bins: &Bins, is_sorted: bool) -> Result<wgpu::ComputePipeline> {
     gpu.compute_pipeline(&Compute {
         label: "hiz.cut_bins.pipeline",
-        source: emit_cut_module(),
+        source: emit_passes::cut_module(bins.plane_set()),
         entry_point: "emit_cut",
         layouts: &[gpu.layout("hiz.cut_bins.layout", OF_BINS)?],
         constants: &[("BY_INDEX", flag(is_by_index(bins))), ("SORTED", flag(is_sorted))],

@@ -9,17 +9,19 @@ use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{File, Source, wgsl};
 use crate::instances::Instances;
 use crate::instances::piece::Piece;
-use crate::output::bins::{Arrangement, BLOCK_WORDS, Bins, PieceBins};
+use crate::output::bins::{Arrangement, BLOCK_WORDS, Bins, PieceBins, PlaneSet};
 
-/// Invocations of a workgroup of the passes with an invocation per bin or word;
-/// `shaders/output/emit_bins.wgsl`, `emit_scatter.wgsl`, `emit_instances.wgsl`.
+/// Invocations of a workgroup; `shaders/output/emit_prefix.wgsl`, `emit_scatter.wgsl`,
+/// `emit_instances.wgsl`.
 pub(crate) const WORKGROUP: u32 = 64;
+/// Meshes of an invocation of the passes over bins; `shaders/output/emit_prefix.wgsl`.
+pub(crate) const MESHES: u32 = 8;
 
 /// A pass: its label, shader, entry points and bindings.
 #[derive(Debug, Clone, Copy)]
 struct Pass {
     label: &'static str,
-    module: fn() -> Source,
+    module: fn(PlaneSet) -> Source,
     bindings: &'static [(u32, Binding)],
 }
 
@@ -27,29 +29,46 @@ fn module(files: &[File]) -> Source {
     Source::of(&[&[wgsl!("instances/piece"), wgsl!("output/emit")], files])
 }
 
+fn planes_module(set: PlaneSet, files: &[File]) -> Source {
+    let planes = match set {
+        PlaneSet::One => wgsl!("output/planes_one"),
+        PlaneSet::Four => wgsl!("output/planes_four"),
+    };
+    module(&[&[planes, wgsl!("output/emit_planes")], files].concat())
+}
+
 /// The shader that counts bits.
-pub(crate) fn scan_module() -> Source {
-    module(&[wgsl!("output/emit_scan")])
+pub(crate) fn scan_module(set: PlaneSet) -> Source {
+    planes_module(set, &[wgsl!("output/emit_prefix"), wgsl!("output/emit_scan")])
 }
 
 /// The shader that finds the bins.
-pub(crate) fn bins_module() -> Source {
-    module(&[wgsl!("output/emit_record"), wgsl!("output/emit_bins")])
+pub(crate) fn bins_module(set: PlaneSet) -> Source {
+    let files =
+        [wgsl!("output/emit_prefix"), wgsl!("output/emit_record"), wgsl!("output/emit_bins")];
+    planes_module(set, &files)
 }
 
-/// The shader that writes the draws of bins that are not empty.
-pub(crate) fn draws_module() -> Source {
-    module(&[wgsl!("output/emit_record"), wgsl!("output/emit_draws")])
+/// The shader that writes the draws of bins that are not empty; planes do not matter to it.
+pub(crate) fn draws_module(_: PlaneSet) -> Source {
+    let files =
+        [wgsl!("output/emit_prefix"), wgsl!("output/emit_record"), wgsl!("output/emit_draws")];
+    module(&files)
 }
 
 /// The shader that writes the indices of bins.
-pub(crate) fn scatter_module() -> Source {
-    module(&[wgsl!("output/emit_scatter")])
+pub(crate) fn scatter_module(set: PlaneSet) -> Source {
+    planes_module(set, &[wgsl!("output/emit_scatter")])
 }
 
 /// The shader that writes an index and a draw for each instance.
-pub(crate) fn instances_module() -> Source {
-    module(&[wgsl!("output/emit_record"), wgsl!("output/emit_instances")])
+pub(crate) fn instances_module(set: PlaneSet) -> Source {
+    planes_module(set, &[wgsl!("output/emit_record"), wgsl!("output/emit_instances")])
+}
+
+/// The shader that cuts the mask to what is listed.
+pub(crate) fn cut_module(set: PlaneSet) -> Source {
+    planes_module(set, &[wgsl!("output/emit_cut")])
 }
 
 const SCAN: Pass = Pass {
@@ -116,12 +135,13 @@ impl Pass {
     fn pipeline(
         &self,
         gpu: &Gpu,
+        bins: &Bins,
         entry_point: &'static str,
         constants: &[(&'static str, f64)],
     ) -> Result<wgpu::ComputePipeline> {
         gpu.compute_pipeline(&Compute {
             label: self.label,
-            source: (self.module)(),
+            source: (self.module)(bins.plane_set()),
             entry_point,
             layouts: &[gpu.layout(self.label, self.bindings)?],
             constants,
@@ -147,7 +167,7 @@ impl Pass {
 struct Step {
     pipeline: wgpu::ComputePipeline,
     bindings: wgpu::BindGroup,
-    workgroups: u32,
+    workgroups: [u32; 2],
 }
 
 /// The dispatches that make the lists and draws of all pieces.
@@ -177,7 +197,8 @@ impl Emission {
         for step in &self.steps {
             pass.set_pipeline(&step.pipeline);
             pass.set_bind_group(0, &step.bindings, &[]);
-            pass.dispatch_workgroups(if idle { 0 } else { step.workgroups }, 1, 1);
+            let [x, y] = step.workgroups;
+            pass.dispatch_workgroups(if idle { 0 } else { x }, y, 1);
         }
     }
 }
@@ -193,11 +214,11 @@ fn add_scan(gpu: &Gpu, bins: &Bins, piece: &PieceBins, steps: &mut Vec<Step>) ->
             [&piece.planes, &piece.before, &piece.blocks, &bins.totals, &bins.draw_counts];
         SCAN.bind(gpu, &piece.uniform, &buffers)
     })?;
-    let words = if by_index { piece.words } else { piece.words * bins.meshes.most_lods() };
+    let sets = if by_index { 1 } else { bins.sets() };
     let constants = [("BY_INDEX", flag(by_index))];
-    let points = [("emit_block", words.div_ceil(BLOCK_WORDS)), ("emit_top", 1)];
+    let points = [("emit_block", [piece.words.div_ceil(BLOCK_WORDS), sets]), ("emit_top", [1, 1])];
     for (entry_point, workgroups) in points {
-        let pipeline = SCAN.pipeline(gpu, entry_point, &constants)?;
+        let pipeline = SCAN.pipeline(gpu, bins, entry_point, &constants)?;
         steps.push(Step { pipeline, bindings: bindings.clone(), workgroups });
     }
     Ok(())
@@ -211,6 +232,7 @@ fn add_bins(
     steps: &mut Vec<Step>,
 ) -> Result<()> {
     let PieceBins { planes, before, blocks, uniform, .. } = output;
+    let of_meshes = [bins.meshes.len().div_ceil(WORKGROUP * MESHES), 1];
     let is_reserved = bins.arrangement == Arrangement::Reserved;
     let (reserved, indexed) =
         (("RESERVED", flag(is_reserved)), ("INDEXED", flag(bins.meshes.is_indexed())));
@@ -229,9 +251,9 @@ fn add_bins(
         BINS.bind(gpu, uniform, &buffers)
     })?;
     steps.push(Step {
-        pipeline: BINS.pipeline(gpu, "emit_bins", &[reserved, indexed])?,
+        pipeline: BINS.pipeline(gpu, bins, "emit_bins", &[reserved, indexed])?,
         bindings: bindings.clone(),
-        workgroups: bins.records.div_ceil(WORKGROUP),
+        workgroups: of_meshes,
     });
     if !is_reserved {
         let bindings = made(&output.passes[2], || {
@@ -239,9 +261,9 @@ fn add_bins(
             DRAWS.bind(gpu, uniform, &buffers)
         })?;
         steps.push(Step {
-            pipeline: DRAWS.pipeline(gpu, "emit_draws", &[indexed])?,
+            pipeline: DRAWS.pipeline(gpu, bins, "emit_draws", &[indexed])?,
             bindings: bindings.clone(),
-            workgroups: 1,
+            workgroups: of_meshes,
         });
     }
     let Some(list) = &output.list else { return Ok(()) };
@@ -252,12 +274,11 @@ fn add_bins(
             [planes, before, blocks, &bins.totals, &output.bins, &index_of, &mesh_of, list];
         SCATTER.bind(gpu, uniform, &buffers)
     })?;
-    let (sorted, lods) = (flag(slots.is_some()), f64::from(bins.meshes.most_lods()));
-    let constants = [reserved, ("SORTED", sorted), ("LODS", lods)];
+    let constants = [reserved, ("SORTED", flag(slots.is_some()))];
     steps.push(Step {
-        pipeline: SCATTER.pipeline(gpu, "emit_scatter", &constants)?,
+        pipeline: SCATTER.pipeline(gpu, bins, "emit_scatter", &constants)?,
         bindings: bindings.clone(),
-        workgroups: output.words.div_ceil(WORKGROUP),
+        workgroups: [output.words.div_ceil(WORKGROUP), bins.sets()],
     });
     Ok(())
 }
@@ -285,9 +306,9 @@ fn add_instances(
         ("LIST", flag(output.list.is_some())),
     ];
     steps.push(Step {
-        pipeline: INSTANCES.pipeline(gpu, "emit_instances", &constants)?,
+        pipeline: INSTANCES.pipeline(gpu, bins, "emit_instances", &constants)?,
         bindings: bindings.clone(),
-        workgroups: output.words.div_ceil(WORKGROUP),
+        workgroups: [output.words.div_ceil(WORKGROUP), 1],
     });
     Ok(())
 }

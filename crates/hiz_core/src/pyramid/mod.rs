@@ -164,6 +164,9 @@ pub struct Pyramid {
     /// Held while reductions that build on each other are recorded and submitted.
     #[cfg(feature = "headless")]
     pub(crate) submitting: Locked<()>,
+    /// Whether the depth image has far pixels that may have no depth; its conversion lost which.
+    #[cfg(feature = "headless")]
+    pub(crate) no_data_is_far: AtomicBool,
     /// The last reduction that is known to have run; one that was only recorded may never run.
     reduced: Arc<AtomicU32>,
     /// The view of a cull, for instances and for groups.
@@ -229,6 +232,8 @@ impl Pyramid {
             atlas: Locked::default(),
             #[cfg(feature = "headless")]
             submitting: Locked::default(),
+            #[cfg(feature = "headless")]
+            no_data_is_far: AtomicBool::new(false),
             reduced: Arc::default(),
             // Culls read each image, or the atlas.
             view: RecordedUniform::new(gpu, "hiz.cull.view_uniform", KEPT_IMAGES + 1)?,

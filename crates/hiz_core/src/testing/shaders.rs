@@ -20,8 +20,9 @@ use crate::instances::update::update_module;
 #[cfg(feature = "methods")]
 use crate::methods::{coarse_level_module, fragment_levels_module, texts_module};
 use crate::occluders::device_raster::occluders_module;
+use crate::output::bins::PlaneSet;
 use crate::output::compact::{compact_module, copy_module};
-use crate::output::cut::{cut_module, emit_cut_module};
+use crate::output::cut::cut_module;
 use crate::output::emit_passes;
 use crate::output::views::join_module;
 use crate::pyramid::mips_passes::mips_module;
@@ -44,8 +45,8 @@ pub(super) const KINDS: [BoundsKind; 5] = [
 /// Every way to emit the kept instances, each with a shader of its own.
 pub(super) const EMITS: [(&str, EmitKey); 5] = [
     ("list", EmitKey::NO_LIST),
-    ("planes", EmitKey::Planes { by_index: false, bins: ONE_LOD }),
-    ("planes of LODs", EmitKey::Planes { by_index: false, bins: LODS }),
+    ("planes", EmitKey::Planes { by_index: false, set: PlaneSet::One, bins: ONE_LOD }),
+    ("planes of LODs", EmitKey::Planes { by_index: false, set: PlaneSet::Four, bins: LODS }),
     ("bins", EmitKey::Append { list: true, capped: true, record_words: 5, bins: ONE_LOD }),
     ("bins of LODs", EmitKey::Append { list: true, capped: true, record_words: 5, bins: LODS }),
 ];
@@ -72,12 +73,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("compact".to_owned(), compact_module()),
         ("copy".to_owned(), copy_module()),
         ("cut".to_owned(), cut_module()),
-        ("emit_cut".to_owned(), emit_cut_module()),
-        ("emit_scan".to_owned(), emit_passes::scan_module()),
-        ("emit_bins".to_owned(), emit_passes::bins_module()),
-        ("emit_draws".to_owned(), emit_passes::draws_module()),
-        ("emit_scatter".to_owned(), emit_passes::scatter_module()),
-        ("emit_instances".to_owned(), emit_passes::instances_module()),
+        ("emit_draws".to_owned(), emit_passes::draws_module(PlaneSet::One)),
         ("count".to_owned(), count_module()),
         ("among_order".to_owned(), among_order_module()),
         ("join_views".to_owned(), join_module()),
@@ -89,6 +85,16 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
         ("snippets".to_owned(), snippets()),
     ];
+    for set in [PlaneSet::One, PlaneSet::Four] {
+        let modules: [(_, fn(_) -> _); 5] = [
+            ("emit_cut", emit_passes::cut_module),
+            ("emit_scan", emit_passes::scan_module),
+            ("emit_bins", emit_passes::bins_module),
+            ("emit_scatter", emit_passes::scatter_module),
+            ("emit_instances", emit_passes::instances_module),
+        ];
+        all.extend(modules.map(|(name, module)| (format!("{name} {set:?}"), module(set))));
+    }
     #[cfg(feature = "methods")]
     all.extend([
         ("published tests".to_owned(), texts_module()),
@@ -118,13 +124,15 @@ pub(super) fn all() -> Vec<(String, Source)> {
         );
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
-    // The sets of an early pass differ in a constant.
-    let early = (DepthStore::Atlas, FramePass::Early(Candidates::History));
+    // The sets of an early pass differ in a constant, and in what is decided.
+    let early = [Candidates::History, Candidates::Size]
+        .map(|candidates| (DepthStore::Atlas, FramePass::Early(candidates)));
     let passes = [FramePass::Alone, FramePass::Late];
     let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
-    for (store, pass) in passes.chain([early]) {
+    for (store, pass) in passes.chain(early) {
+        let decision = pass.decision();
         for (name, is_top) in [("cull_groups", true), ("cull_children", false)] {
-            let module = cull_boxes_module(store, Decision::Seen, (pass, is_top));
+            let module = cull_boxes_module(store, decision, (pass, is_top));
             all.push((format!("{name} {store:?} {pass:?}"), module));
         }
         let emits: &[_] = if pass == FramePass::Alone { &EMITS } else { &EMITS_OF_TWO };
@@ -133,8 +141,8 @@ pub(super) fn all() -> Vec<(String, Source)> {
         {
             let named = |name: &str| format!("{name} {way} {store:?} {pass:?} {kind:?}");
             let of = (emit, pass);
-            all.push((named("cull"), flat_module(store, kind, Decision::Seen, of)));
-            let members = cull_members_module(store, kind, Decision::Seen, of);
+            all.push((named("cull"), flat_module(store, kind, decision, of)));
+            let members = cull_members_module(store, kind, decision, of);
             all.push((named("cull_members"), members));
             if matches!(pass, FramePass::Early(_)) {
                 continue;
@@ -182,6 +190,8 @@ fn snippets() -> Source {
 
 #[cfg(test)]
 pub(in crate::testing) mod tests {
+    use std::collections::HashSet;
+
     use super::*;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
@@ -197,6 +207,28 @@ pub(in crate::testing) mod tests {
             .validate(&module)
             .unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
         module
+    }
+
+    /// The first modules of the list that have every file between them.
+    ///
+    /// What a file declares is the same in all of its modules.
+    /// So declarations are looked at here, instead of in every module again.
+    pub(in crate::testing) fn covering() -> Vec<(Source, naga::Module)> {
+        let mut seen = HashSet::new();
+        // All files of a module are taken in, so it is no `any`, which would stop at the first one.
+        let mut has_new = |source: &Source| {
+            source.files().iter().filter(|file| seen.insert(file.path)).count() > 0
+        };
+        let sources = all().into_iter().map(|(_, source)| source);
+        sources.filter(&mut has_new).map(|s| (s.clone(), parse(&s.text()))).collect()
+    }
+
+    #[test]
+    fn every_file_is_in_a_module() {
+        let covered: HashSet<&str> =
+            covering().iter().flat_map(|(source, _)| source.files()).map(|f| f.path).collect();
+        let left_out: Vec<_> = files().into_iter().filter(|(p, _)| !covered.contains(p)).collect();
+        assert!(left_out.is_empty(), "{left_out:?}");
     }
 
     #[test]
@@ -251,7 +283,7 @@ pub(in crate::testing) mod tests {
                 1,
                 "the depth that slack has moved"
             );
-            assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
+            assert_eq!(calls(&module, "surely_outside", "bar"), 2, "-A and 1 - A");
             assert_eq!(calls(&module, "surely_in_front", "bar"), 1, "d - A");
             assert_eq!(
                 calls(&module, "revealing_depth", "bar"),

@@ -67,6 +67,11 @@ pub fn empty_submit_ms(engine: &Engine) -> Result<f64> {
     submitted_ms(engine, |_| Ok(()))
 }
 
+/// How many pipelines an engine has made so far.
+pub fn pipelines_made(engine: &Engine) -> u64 {
+    engine.context().gpu.making.pipelines.get()
+}
+
 /// Wall-clock milliseconds of copying `from` into `to` on one thread of the host.
 /// This is the price of touching every number once.
 ///

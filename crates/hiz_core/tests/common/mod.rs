@@ -8,6 +8,25 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use hiz_core::headless::Engine;
 use hiz_core::{Camera, DepthConvention, ImageSize, Mat4, wgpu};
 
+/// Sizes at which the blocks of a reduction begin and end, as width and height.
+/// There are single pixels, rows, columns, powers of two and their neighbours, and primes.
+pub(crate) const BLOCK_SIZES: [(u32, u32); 14] = [
+    (1, 1),
+    (1, 9),
+    (9, 1),
+    (2, 2),
+    (7, 5),
+    (13, 17),
+    (31, 33),
+    (64, 64),
+    (65, 63),
+    (127, 129),
+    (251, 241),
+    (513, 31),
+    (1023, 9),
+    (640, 360),
+];
+
 /// The engine that the tests of this process share.
 /// Each thread that has asked for it holds it until that thread ends.
 /// After the last of them the device is waited for and destroyed.

@@ -9,28 +9,13 @@ use hiz_core::{
 };
 use wgpu::TextureFormat as Format;
 
-use crate::common::{CONVENTIONS, Random, camera_along_z, depth_descriptor, engine, ndc};
+use crate::common::{
+    BLOCK_SIZES, CONVENTIONS, Random, camera_along_z, depth_descriptor, engine, ndc,
+};
 use crate::{COPIED, SAMPLED, STORED, differing_levels, encoder, image};
 
-const SIZES: [(u32, u32); 17] = [
-    (1, 1),
-    (1, 9),
-    (9, 1),
-    (2, 2),
-    (7, 5),
-    (13, 17),
-    (31, 33),
-    (64, 64),
-    (65, 63),
-    (127, 129),
-    (251, 241),
-    (255, 257),
-    (513, 31),
-    (1023, 9),
-    (1100, 9),
-    (640, 360),
-    (1920, 1080),
-];
+/// Beside those at which blocks begin and end: more than one workgroup, and a common screen.
+const LARGER_SIZES: [(u32, u32); 3] = [(255, 257), (1100, 9), (1920, 1080)];
 
 /// How the image lies in its texture: alone, four pixels per texel, or within a larger one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -194,7 +179,8 @@ fn differing(engine: &Engine, sizes: &[(u32, u32)], stored: &[StoredLevels]) -> 
 
 #[test]
 fn a_hundred_rectangles_a_size_end_as_a_full_reduction() {
-    assert_eq!(differing(&engine(), &SIZES, &STORED), 0);
+    let sizes = [&BLOCK_SIZES[..], &LARGER_SIZES].concat();
+    assert_eq!(differing(&engine(), &sizes, &STORED), 0);
 }
 
 const BLOCKS: &str = "if block.x < step.end.x && block.y < step.end.y {";

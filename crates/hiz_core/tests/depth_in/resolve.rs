@@ -521,7 +521,7 @@ fn pyramids_of_resolved_samples_have_both_ends() {
     // The nearest depth from the farthest samples, and background by the farthest sample.
     for (what, by, depths) in [
         ("nearest_sanitized4(near));", "nearest_sanitized4(far));", Depths::Both),
-        ("RECEIVERS && is_background(near)", "RECEIVERS && is_background(far)", Depths::Receivers),
+        ("RECEIVERS & is_background(near)", "RECEIVERS & is_background(far)", Depths::Receivers),
         ("sanitized_near(sample_bits(at, k))", "sanitized_near(sample_bits(at, 0))", Depths::Both),
     ] {
         assert!(wrong_levels(depths, &[(what, by)]) > 0, "{what} -> {by}: stayed green");

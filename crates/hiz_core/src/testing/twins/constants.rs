@@ -16,7 +16,6 @@ use crate::cull::refine;
 use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::clock_check;
 use crate::gpu::depth_source::SourceKind;
-use crate::gpu::shader::FILES;
 use crate::host::rounding::EPS;
 use crate::input::bounds::BoundsKind;
 use crate::input::image::MAX_IMAGE_SIDE;
@@ -28,7 +27,7 @@ use crate::instances::update;
 use crate::instances::volume_record::{ABSENT_CENTER, BEYOND_LIMITS, LARGEST};
 use crate::instances::{from_buffer, tiers};
 use crate::methods;
-use crate::output::bins::BLOCK_WORDS;
+use crate::output::bins::{BLOCK_WORDS, PlaneSet};
 use crate::output::compact::SCATTER_WORKGROUP;
 use crate::output::cut::CUT_WORKGROUP;
 use crate::output::emit_passes;
@@ -44,8 +43,8 @@ use crate::pyramid::receiver_mask::{MASK_BLOCK_LOG2, MASK_SIDE};
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
 use crate::pyramid::resolve;
 use crate::testing::lod;
-use crate::testing::shaders::tests::parse;
-use crate::testing::shaders::{EMITS, EMITS_OF_TWO, KINDS, all, files};
+use crate::testing::shaders::tests::{covering, parse};
+use crate::testing::shaders::{EMITS, EMITS_OF_TWO, KINDS, files};
 use crate::yardstick::reduce as yardstick;
 
 /// From this magnitude on, the next float32 makes up for two flushed subnormals.
@@ -141,16 +140,17 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/record_layout", "ABSENT_CENTER_BITS", bits(ABSENT_CENTER)),
         ("instances/record_layout", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
-        ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
-        ("cull/shadow_classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
+        ("cull/decision", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
         ("output/join", "WORKGROUP", int(views::WORKGROUP)),
-        ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
-        ("output/emit_bins", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_planes", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
+        ("output/emit_prefix", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_prefix", "MESHES", int(emit_passes::MESHES)),
         ("output/emit_instances", "WORKGROUP", int(emit_passes::WORKGROUP)),
-        ("output/emit_scan", "LANES", int(emit_passes::WORKGROUP)),
         ("output/emit_scan", "SHARE", int(BLOCK_WORDS / emit_passes::WORKGROUP)),
         ("output/emit_scatter", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/planes_one", "PLANES", int(PlaneSet::One.planes())),
+        ("output/planes_four", "PLANES", int(PlaneSet::Four.planes())),
         ("output/mesh_table", "MESH_TEXELS", MESH_TEXELS as f64),
         ("output/cut", "WORKGROUP", int(CUT_WORKGROUP)),
         ("output/emit_cut", "WORKGROUP", int(CUT_WORKGROUP)),
@@ -187,7 +187,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
 /// What is known of those that carry a proof is in `constants_cover_what_is_counted`.
 const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
-    ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
+    ("cull/decision", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
@@ -211,7 +211,6 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ),
     ("cull/refine", &["REFINED"]),
     ("cull/shadow", &["NO_FACE"]),
-    ("cull/shadow_classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     (
         "pyramid/receiver_mask",
@@ -273,19 +272,16 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("instances/bounds_point_support", &["CANDIDATES", "OUTLINES"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
-    ("output/emit_draws", &["LANES"]),
     ("output/emit_record", &["COMMON_WORDS"]),
-    ("output/emit_scatter", &["FOUR", "NUMBERS"]),
+    ("output/emit_scatter", &["MANY", "LINE", "NO_INDEX_BIT"]),
+    ("output/planes_four", &["COUNT_BITS", "COUNT_MASK"]),
     ("output/mesh_table", &["ERRORS_LOG2"]),
 ];
 
 /// The constants of every file that are one number: by file and name.
 fn numbers() -> BTreeMap<(String, String), f64> {
     let mut numbers = BTreeMap::new();
-    for (_, source) in all() {
-        let text = source.text();
-        let module = parse(&text);
-        let here: Vec<_> = FILES.iter().filter(|file| text.contains(file.text)).collect();
+    for (source, module) in covering() {
         for (_, constant) in module.constants.iter() {
             let Some(name) = &constant.name else { continue };
             let value = match module.global_expressions[constant.init] {
@@ -295,7 +291,7 @@ fn numbers() -> BTreeMap<(String, String), f64> {
                 _ => continue,
             };
             let said = format!("const {name}:");
-            for file in here.iter().filter(|file| file.text.contains(&said)) {
+            for file in source.files().iter().filter(|file| file.text.contains(&said)) {
                 numbers.insert((file.path.to_owned(), name.clone()), value);
             }
         }
@@ -358,6 +354,8 @@ fn constants_fit_each_other() {
     assert_eq!(MAX_IMAGE_SIDE, 1 << (MAX_LEVELS - 1));
     assert_eq!(Stage::ALL.map(|s| s as usize), std::array::from_fn(|i| i));
     assert!(BLOCK_WORDS.is_power_of_two());
+    // Counts within a block are packed to 16 bits.
+    assert!(32 * BLOCK_WORDS <= 1 << 16);
     // A texel for the number of a mesh's LODs, and one for each four errors.
     assert_eq!(MESH_TEXELS - 1, MAX_LODS >> number("output/mesh_table", "ERRORS_LOG2") as u32);
     // The spacing just below 2^-100 exceeds two flushed numbers.
@@ -389,7 +387,7 @@ fn constants_cover_what_is_counted() {
     assert!(number("instances/bounds_sphere", "SQUARES_FLOOR") >= two_to(-100));
     assert!(number("instances/bounds_sphere", "AXES") >= 3.0);
     // The margin is at least 2^-70; a ratio may not overflow.
-    assert!(number("cull/classify", "LEAST_W") >= two_to(-66));
+    assert!(number("cull/decision", "LEAST_W") >= two_to(-66));
     let planes = |name: &str| number("cull/supporting_planes", name);
     // Six roundings of a texel's comparison, and what is flushed there.
     assert!(planes("TEXEL_ULPS") >= 6.0);
@@ -419,9 +417,8 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("cut", line(CUT_WORKGROUP)),
         ("emit_bins", line(emit_passes::WORKGROUP)),
         ("emit_block", line(emit_passes::WORKGROUP)),
-        // One workgroup, the largest that WebGPU promises.
         ("emit_cut", line(CUT_WORKGROUP)),
-        ("emit_draws", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
+        ("emit_draws", line(emit_passes::WORKGROUP)),
         ("emit_instances", line(emit_passes::WORKGROUP)),
         ("emit_scatter", line(emit_passes::WORKGROUP)),
         ("emit_top", line(emit_passes::WORKGROUP)),
@@ -473,10 +470,10 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
 fn workgroups_have_the_sizes_that_dispatches_count_on() {
     let expected = workgroups();
     let mut found = BTreeSet::new();
-    for (name, source) in all() {
-        for point in parse(&source.text()).entry_points {
+    for (_, module) in covering() {
+        for point in module.entry_points {
             let size = expected.get(point.name.as_str());
-            assert_eq!(size, Some(&point.workgroup_size), "{name}: {}", point.name);
+            assert_eq!(size, Some(&point.workgroup_size), "{}", point.name);
             found.insert(point.name);
         }
     }
@@ -502,8 +499,10 @@ fn a_cull_sets_every_override() {
             decision: Decision::Seen,
         };
         let alone = EMITS.map(|emit| (emit, FramePass::Alone));
-        let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
+        let early = [Candidates::History, Candidates::Size].map(FramePass::Early);
+        let of_two = early
             .into_iter()
+            .chain([FramePass::Late])
             .flat_map(|pass| EMITS_OF_TWO.map(|emit| (emit, pass)));
         for ((way, emit), pass) in alone.into_iter().chain(of_two) {
             let report = ReportKey {
@@ -516,7 +515,7 @@ fn a_cull_sets_every_override() {
             };
             let set = classify_constants(&key).into_iter().chain(report_constants(&report));
             let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-            let module = parse(&flat_module(store, kind, Decision::Seen, (emit, pass)).text());
+            let module = parse(&flat_module(store, kind, pass.decision(), (emit, pass)).text());
             let declared: BTreeSet<String> =
                 module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
             assert_eq!(set, declared, "{kind:?} {way} {pass:?}");

@@ -30,8 +30,8 @@ use crate::pyramid::receiver_mask::MaskUniform;
 use crate::pyramid::resolve::{BandUniform, ResolvedUniform};
 use crate::pyramid::steps::StepUniform;
 use crate::testing::lod::LodCase;
-use crate::testing::shaders::tests::parse;
-use crate::testing::shaders::{all, files};
+use crate::testing::shaders::files;
+use crate::testing::shaders::tests::covering;
 use crate::yardstick::reduce as yardstick;
 
 /// Structs that only a shader has: they lie in no buffer.
@@ -69,17 +69,16 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Value",
     "Volume",
     "Walk",
-    "Word",
 ];
 
 /// Offsets of a WGSL struct's members, and its size.
 type Layout = (Vec<(String, u32)>, u32);
 
-/// The layouts of every struct, by name, in all modules.
+/// The layouts of every struct, by name.
 fn structs() -> BTreeMap<String, BTreeSet<Layout>> {
     let mut structs: BTreeMap<String, BTreeSet<Layout>> = BTreeMap::new();
-    for (_, source) in all() {
-        for (_, ty) in parse(&source.text()).types.iter() {
+    for (_, module) in covering() {
+        for (_, ty) in module.types.iter() {
             let naga::TypeInner::Struct { members, span } = &ty.inner else { continue };
             let members = members.iter().map(|m| (m.name.clone().expect("a member"), m.offset));
             let name = ty.name.clone().expect("a struct has a name");
@@ -105,7 +104,7 @@ macro_rules! twin {
 fn struct_twins() -> Vec<(&'static str, Layout)> {
     vec![
         twin!("BinRange", BinRecord {
-            "begin" = begin, "count" = count, "shift" = shift, "padding" = padding,
+            "begin" = begin, "count" = count, "shift" = shift, "filled" = filled,
         }),
         twin!("Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
@@ -312,12 +311,11 @@ fn records_lie_as_the_shaders_read_them() {
 
 #[test]
 fn a_pyramid_has_as_many_bindings_as_chunks() {
-    for (name, source) in all() {
-        let module = parse(&source.text());
+    for (source, module) in covering() {
         let names = module.global_variables.iter().filter_map(|(_, v)| v.name.clone());
         let mut chunks: Vec<_> = names.filter(|name| name.starts_with("chunk_")).collect();
         chunks.sort();
         let all: Vec<_> = (0..PYRAMID_CHUNKS).map(|i| format!("chunk_{i}")).collect();
-        assert!(chunks.is_empty() || chunks == all, "{name}: {chunks:?}");
+        assert!(chunks.is_empty() || chunks == all, "{source:?}: {chunks:?}");
     }
 }
