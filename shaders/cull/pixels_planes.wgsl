@@ -4,17 +4,18 @@
 // A face gives a plane in front of the volume, or one behind it:
 //
 // facing * (z / w - A) > front - slope . (x, y) on all of the volume
-// -facing * (z / w - A) > back + slope . (x, y) on all of the volume
+// -facing * (z / w - A) > back - slope . (x, y) on all of the volume
 //
-// Of a sphere, each tangent has a parallel one on the other side.
 // docs/accuracy.md derives the margins, under "Counts of pixels".
+//
+// What is used here and defined elsewhere:
+//
+// - `pixels_planes_box.wgsl` or `pixels_planes_any.wgsl`: `OUTLINE_PLANES`, `FACE_PLANES`,
+//   `TWO_SIDED`, and `fill_planes`, which fills what is here
 
-// Candidates that bound the depth; those that bound the outline come first.
-const FACE_PLANES: u32 = CANDIDATES - OUTLINES;
-// And one of slope 0 behind them, at the nearest and farthest depth of all of the volume.
-const DEPTH_PLANES: u32 = FACE_PLANES + 1u;
 // No array is empty.
-const OUTLINE_PLACES: u32 = max(OUTLINES, 1u);
+const OUTLINE_PLACES: u32 = max(OUTLINE_PLANES, 1u);
+const FACE_PLACES: u32 = max(FACE_PLANES, 1u);
 // The offset of a plane that says nothing.
 const NO_PLANE: f32 = -0x1p100;
 
@@ -22,11 +23,14 @@ struct PixelPlanes {
     // The rectangle around the volume, to fractions of a pixel.
     left_top: vec2<f32>,
     right_bottom: vec2<f32>,
+    // The offsets of planes of slope 0, at the nearest and the farthest depth of the volume.
+    front: f32,
+    back: f32,
     outline_slopes: array<vec2<f32>, OUTLINE_PLACES>,
     outlines: array<f32, OUTLINE_PLACES>,
-    face_slopes: array<vec2<f32>, DEPTH_PLANES>,
-    fronts: array<f32, DEPTH_PLANES>,
-    backs: array<f32, DEPTH_PLANES>,
+    // Slope, and the offsets in front and behind.
+    // Where TWO_SIDED is true, the plane behind has the opposite slope.
+    faces: array<vec4<f32>, FACE_PLACES>,
 }
 
 // An offset less than the least r / w, if a certificate proves it, less the margin of its
@@ -66,46 +70,12 @@ fn opposite(r: Value) -> Value {
     return Value(-r.center, r.error, -r.half);
 }
 
-fn pixel_planes(planes: ptr<function, PixelPlanes>, p: Projected, most: vec2<f32>) {
-    let columns = proved_interval(p.x, p.w, p.w_min);
-    let rows = proved_interval(p.y, p.w, p.w_min);
-    (*planes).left_top = vec2<f32>(columns.x, rows.x);
-    (*planes).right_bottom = vec2<f32>(columns.y, rows.y);
-    for (var i = 0u; i < OUTLINES; i += 1u) {
-        let guess = candidate(i, p);
-        let tilt = usable(guess.slope);
-        let r = tilted(0.0, tilt.slope, p);
-        let interval = ratio_interval(r, p.w);
-        let extent = interval.y - interval.x;
-        let is_low = on_border(guess.own, interval.x, extent);
-        let is_border = is_low || on_border(guess.own, interval.y, extent);
-        // The other side of an outline belongs to another edge.
-        let sign = select(-1.0, 1.0, is_low);
-        let slope = sign * tilt.slope;
-        let row = Value(sign * r.center, r.error, sign * r.half);
-        let least = select(-interval.y, interval.x, is_low);
-        let offset = proved_offset(row, least, slope, most, p);
-        (*planes).outline_slopes[i] = slope;
-        (*planes).outlines[i] = select(NO_PLANE, offset, is_border && !tilt.is_steep);
-    }
-    for (var i = 0u; i < FACE_PLANES; i += 1u) {
-        let guess = candidate(OUTLINES + i, p);
-        let tilt = usable(guess.slope);
-        let r = tilted(guess.facing, tilt.slope, p);
-        let interval = ratio_interval(r, p.w);
-        let extent = interval.y - interval.x;
-        let in_front = on_border(guess.own, interval.x, extent) && !tilt.is_steep;
-        let behind = on_border(guess.own, interval.y, extent) && !tilt.is_steep;
-        let front = proved_offset(r, interval.x, tilt.slope, most, p);
-        let back = proved_offset(opposite(r), -interval.y, tilt.slope, most, p);
-        (*planes).face_slopes[i] = tilt.slope;
-        (*planes).fronts[i] = select(NO_PLANE, front, in_front);
-        (*planes).backs[i] = select(NO_PLANE, back, behind);
-    }
+// The planes of slope 0, whose rows reach from `depths.x` to `depths.y` of the farther side.
+fn fill_depths(
+    planes: ptr<function, PixelPlanes>, depths: vec2<f32>, p: Projected, most: vec2<f32>,
+) {
     let none = vec2<f32>(0.0);
     let depth = tilted(farther_sign(), none, p);
-    let depths = ratio_interval(depth, p.w);
-    (*planes).face_slopes[FACE_PLANES] = none;
-    (*planes).fronts[FACE_PLANES] = proved_offset(depth, depths.x, none, most, p);
-    (*planes).backs[FACE_PLANES] = proved_offset(opposite(depth), -depths.y, none, most, p);
+    (*planes).front = proved_offset(depth, depths.x, none, most, p);
+    (*planes).back = proved_offset(opposite(depth), -depths.y, none, most, p);
 }

@@ -1,6 +1,11 @@
 // Four texels of a row of any level, from an atlas.
 
-// The bits of the texels 4 q to 4 q + 3 of row y of a level; pixels of level 0 come as given.
+// The pixels 4 q to 4 q + 3 of row y, as given.
+fn pixel_row(q: u32, y: u32) -> vec4<u32> {
+    return texel_row(0u, q, y);
+}
+
+// The farthest depths of these texels of a level.
 fn texel_row(level: u32, q: u32, y: u32) -> vec4<u32> {
     return textureLoad(atlas, pyramid.origins[level].xy + vec2<u32>(q, y));
 }

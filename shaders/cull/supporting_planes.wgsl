@@ -77,7 +77,11 @@ struct Candidate {
 
 // Bounds of r / w in pixels, where certificates prove them.
 fn proved_interval(r: Value, w: Value, w_min: f32) -> vec2<f32> {
-    let guess = ratio_interval(r, w);
+    return proved_ends(ratio_interval(r, w), r, w, w_min);
+}
+
+// The same from a guess of both.
+fn proved_ends(guess: vec2<f32>, r: Value, w: Value, w_min: f32) -> vec2<f32> {
     let widened = GUESS_ERRORS * error_bound(r, max(abs(guess.x), abs(guess.y)), w) / w_min;
     // Barred, so that what is certified is what is returned.
     let low = bar(clamp(guess.x - widened, -BEYOND, BEYOND));

@@ -117,8 +117,6 @@ fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
 const EDGES: u32 = 12u;
 const FACES: u32 = 6u;
 const CANDIDATES: u32 = EDGES + FACES;
-// Candidates that bound the outline, which come first.
-const OUTLINES: u32 = EDGES;
 // Edges along an axis, as a power of two: the axis of edge i is i >> EDGES_OF_AXIS_LOG2.
 const EDGES_OF_AXIS_LOG2: u32 = 2u;
 // How near its border a plane counts as touching the box, relative to the box's extent along the

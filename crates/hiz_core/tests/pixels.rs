@@ -266,7 +266,7 @@ fn counts_are_an_output_of_their_own() {
 
 #[test]
 fn planted_faults_turn_it_red() {
-    let planted: [(&str, &[(&str, &str)]); 5] = [
+    let planted: [(&str, &[(&str, &str)]); 7] = [
         (
             "an edge pixel dropped",
             &[(
@@ -277,8 +277,11 @@ fn planted_faults_turn_it_red() {
         (
             "open and hidden swapped",
             &[
-                ("found.hidden += pixels_of(sure.hidden", "found.open += pixels_of(sure.hidden"),
-                ("found.open += pixels_of(sure.open", "found.hidden += pixels_of(sure.open"),
+                (
+                    "(*walk).hidden += pixels_of(sure.hidden",
+                    "(*walk).open += pixels_of(sure.hidden",
+                ),
+                ("(*walk).open += pixels_of(sure.open", "(*walk).hidden += pixels_of(sure.open"),
             ],
         ),
         (
@@ -290,16 +293,18 @@ fn planted_faults_turn_it_red() {
         ),
         (
             "the front taken for the back",
-            &[
-                (
-                    "(*planes).fronts[i] = select(NO_PLANE, front, in_front)",
-                    "(*planes).fronts[i] = select(NO_PLANE, front, in_front || behind)",
-                ),
-                (
-                    "let front = proved_offset(r, interval.x,",
-                    "let front = bar(interval.y) + proved_offset(r, interval.x,",
-                ),
-            ],
+            &[(
+                "select(NO_PLANE, offset, is_front), select(NO_PLANE, offset, is_back));",
+                "select(NO_PLANE, offset, is_back), select(NO_PLANE, offset, is_front));",
+            )],
+        ),
+        (
+            "tiles of all sizes in one place",
+            &[("tiles.begin += select(0u, of_class, k < own_class);", "")],
+        ),
+        (
+            "half of the open texels forgotten",
+            &[("let bits = left.x | left.y | left.z | left.w;", "let bits = left.x | left.y;")],
         ),
         (
             "no margin of a plane",
@@ -318,7 +323,10 @@ fn planted_faults_turn_it_red() {
         assert!(is_red(&engine, rounds, None), "{name}: stayed green");
     }
     let name = "the budget's rest counted as hidden";
-    let fault = ("found.inside += found.undecided;", "found.hidden += found.undecided;");
+    let fault = (
+        "walk.hidden, inside, walk.open, undecided);",
+        "walk.hidden + undecided, inside - undecided, walk.open, 0u);",
+    );
     let engine = Engine::with_planted_faults(None, &[fault]).expect("a Vulkan driver");
     let rounds = campaign(75, 3, Coverage::Area).fitted(&[BoundsKind::OrientedBox], false);
     assert!(is_red(&engine, rounds, Some(2)), "{name}: stayed green");

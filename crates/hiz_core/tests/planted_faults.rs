@@ -193,7 +193,7 @@ fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
 /// The sides of a volume fit's rectangle.
 /// Guesses that are a fifth of a pixel too far inside are harmless: certificates refuse them.
 /// Without the certificates they cut off something visible.
-/// See `proved_interval` in `shaders/cull/supporting_planes.wgsl`.
+/// See `proved_ends` in `shaders/cull/supporting_planes.wgsl`.
 #[test]
 fn sides_of_a_volumes_rectangle_are_proved() {
     let low = ("guess.x - widened", "guess.x - widened + 0.2");

@@ -54,7 +54,18 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
         DepthStore::Apart(SourceKind::Pair) => &[],
         _ => &[wgsl!("cull/pixels_row_alone")],
     };
-    let count = [wgsl!("instances/piece"), wgsl!("cull/pixels_planes"), wgsl!("cull/pixels")];
+    let planes = match kind {
+        BoundsKind::Box | BoundsKind::OrientedBox => wgsl!("cull/pixels_planes_box"),
+        _ => wgsl!("cull/pixels_planes_any"),
+    };
+    let count = [
+        wgsl!("instances/piece"),
+        planes,
+        wgsl!("cull/pixels_planes"),
+        wgsl!("cull/pixels_sure"),
+        wgsl!("cull/pixels_walk"),
+        wgsl!("cull/pixels"),
+    ];
     unexplained(store, kind, Decision::Seen, &[&row[..], alone, &count].concat())
 }
 

@@ -297,7 +297,7 @@ pub(in crate::testing) mod tests {
                 assert_eq!(calls(&module, "surely_before", "bar"), 1, "the edge");
             }
             assert_eq!(calls(&module, "surely_clear", "bar"), 1, "d - A");
-            assert_eq!(calls(&module, "proved_interval", "bar"), 2, "both ends");
+            assert_eq!(calls(&module, "proved_ends", "bar"), 2, "both ends");
             assert_eq!(calls(&module, "supporting_planes", "bar2"), 1, "slopes");
             assert_eq!(calls(&module, "supporting_planes", "bar"), 1, "offsets");
         }
@@ -333,13 +333,9 @@ pub(in crate::testing) mod tests {
                 1,
                 "{kind:?}: a plane's offset"
             );
+            assert_eq!(calls(&module, "proved_ends", "surely_above"), 1, "{kind:?}: left and top");
             assert_eq!(
-                calls(&module, "proved_interval", "surely_above"),
-                1,
-                "{kind:?}: left and top"
-            );
-            assert_eq!(
-                calls(&module, "proved_interval", "surely_below"),
+                calls(&module, "proved_ends", "surely_below"),
                 1,
                 "{kind:?}: right and bottom"
             );

@@ -39,6 +39,8 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Bin",
     "BoxInView",
     "BoxTexels",
+    "Block",
+    "Coarse",
     "Corners",
     "Candidate",
     // Vertex inputs, which are found by location; see `occluders/device_meshes.rs`.
@@ -48,10 +50,13 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Ends2",
     "Ends4",
     "Extent",
+    "Face",
     "Flat",
     "MaskPlace",
+    "Open",
     "Outcome",
     "PixelPlanes",
+    "Place",
     "Prepared",
     "Projected",
     "Slope",
@@ -63,6 +68,7 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Tiling",
     "Value",
     "Volume",
+    "Walk",
 ];
 
 /// Offsets of a WGSL struct's members, and its size.

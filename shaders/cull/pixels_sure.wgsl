@@ -1,0 +1,117 @@
+// What four texels of a row surely say about a volume, for counts of pixels.
+//
+// `pixels_planes.wgsl` has the planes that bound the volume.
+
+fn bar4(x: vec4<f32>) -> vec4<f32> {
+    return bitcast<vec4<f32>>(bitcast<vec4<u32>>(x) ^ vec4<u32>(view.runtime_zero));
+}
+
+// Which bits are depths; others say nothing about their pixels.
+fn are_depths(bits: vec4<u32>) -> vec4<bool> {
+    return bits <= vec4<u32>(ONE_BITS) | bits == vec4<u32>(NEGATIVE_ZERO_BITS);
+}
+
+// `sanitized` of each.
+fn all_sanitized(bits: vec4<u32>) -> vec4<u32> {
+    let is_zero =
+        bits < vec4<u32>(LEAST_NORMAL_BITS) | bits == vec4<u32>(NEGATIVE_ZERO_BITS);
+    let flushed = select(bits, vec4<u32>(0u), is_zero);
+    return select(vec4<u32>(far_bits()), flushed, are_depths(bits));
+}
+
+// How far stored depths are at most, and at least, as `surely_clear` compares them.
+// They are measured from z_slope, and raised by the margin of the comparison.
+fn hiding_bounds(bits: vec4<u32>) -> vec4<f32> {
+    let given = bitcast<vec4<f32>>(bits);
+    let stored =
+        select(max(given, vec4<f32>(LEAST_NORMAL)), min(given, vec4<f32>(1.0)), REVERSED);
+    let moved = bar4(stored * view.depth_factor + view.depth_offset);
+    return with_margin(farther_sign() * bar4(moved - view.z_slope));
+}
+
+fn opening_bounds(bits: vec4<u32>) -> vec4<f32> {
+    let given = bitcast<vec4<f32>>(bits);
+    let stored = select(given, max(given, vec4<f32>(LEAST_NORMAL)), REVERSED);
+    let moved = bar4(stored * view.near_factor + view.near_offset);
+    return with_margin(-farther_sign() * bar4(moved - view.z_slope));
+}
+
+// The floor is added first: the product of a bound near 0 would be subnormal, which is slow.
+fn with_margin(bound: vec4<f32>) -> vec4<f32> {
+    return bound + TEXEL_ULPS * EPS * (abs(bound) + TEXEL_FLOOR / (TEXEL_ULPS * EPS));
+}
+
+// What is sure about four texels of a row.
+struct Sure {
+    untouched: vec4<bool>,
+    // All of the volume is behind the texel's depth, in each of its pixels.
+    hidden: vec4<bool>,
+    // All of the volume is in front of the depth, in each of its pixels.
+    open: vec4<bool>,
+}
+
+// Four texels of a row: where their pixels begin and end, cut at the volume's rectangle.
+struct Place {
+    left: vec4<f32>,
+    right: vec4<f32>,
+    top: f32,
+    bottom: f32,
+}
+
+// The place of the pixels from `begin` to before `end`.
+fn place_of(
+    planes: ptr<function, PixelPlanes>, begin: vec4<u32>, end: vec4<u32>, rows: vec2<u32>,
+) -> Place {
+    // Exact: multiples of 2^-8 below 2^16, and then one of two numbers.
+    let low = vec4<f32>(begin) - view.reach - view.half_size.x;
+    let high = vec4<f32>(end) + view.reach - view.half_size.x;
+    let low_y = f32(rows.x) - view.reach - view.half_size.y;
+    let high_y = f32(rows.y) + view.reach - view.half_size.y;
+    let left_top = (*planes).left_top;
+    let right_bottom = (*planes).right_bottom;
+    return Place(
+        clamp(vec4<f32>(left_top.x), low, high), clamp(vec4<f32>(right_bottom.x), low, high),
+        clamp(left_top.y, low_y, high_y), clamp(right_bottom.y, low_y, high_y));
+}
+
+// The least offset - slope . (x, y) over each texel.
+fn least_over(offset: f32, slope: vec2<f32>, at: Place) -> vec4<f32> {
+    let row = offset - slope.y * select(at.top, at.bottom, slope.y > 0.0);
+    return vec4<f32>(row) - slope.x * select(at.left, at.right, slope.x > 0.0);
+}
+
+// How far each texel's nearest pixel is beyond the outline, and its farthest one at most.
+// No texel is wider or higher than `side`.
+fn beyond(planes: ptr<function, PixelPlanes>, at: Place, side: f32) -> array<vec4<f32>, 2> {
+    var nearest = vec4<f32>(NO_PLANE);
+    var farthest = vec4<f32>(NO_PLANE);
+    for (var i = 0u; i < OUTLINE_PLANES; i += 1u) {
+        let slope = (*planes).outline_slopes[i];
+        let least = least_over((*planes).outlines[i], slope, at);
+        nearest = max(nearest, least);
+        farthest = max(farthest, least + vec4<f32>(dot(abs(slope), vec2<f32>(side))));
+    }
+    return array<vec4<f32>, 2>(nearest, farthest);
+}
+
+// What the depths of four texels say; `outside` is how far they are beyond the outline.
+fn sure_of(
+    planes: ptr<function, PixelPlanes>, at: Place, outside: vec4<f32>, raw: vec4<u32>,
+    near: vec4<u32>,
+) -> Sure {
+    // How far the volume is at least over each texel, and at most.
+    var front = vec4<f32>((*planes).front);
+    var back = vec4<f32>((*planes).back);
+    for (var i = 0u; i < FACE_PLANES; i += 1u) {
+        let plane = (*planes).faces[i];
+        front = max(front, least_over(plane.z, plane.xy, at));
+        back = max(back, least_over(plane.w, select(plane.xy, -plane.xy, TWO_SIDED), at));
+    }
+    let hidden = front > hiding_bounds(all_sanitized(raw));
+    // Background hides nothing, however far the volume is.
+    let is_background = near == vec4<u32>(far_bits());
+    let open = are_depths(near) & (is_background | back > opening_bounds(all_sanitized(near)));
+    // Nothing of the volume is there if it would have to be behind the surface and in front of it.
+    return Sure(outside > vec4<f32>(TEXEL_FLOOR) | (hidden & open), hidden, open);
+}
+
