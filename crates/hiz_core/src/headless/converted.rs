@@ -77,7 +77,7 @@ impl DepthImage {
         let failed: Locked<Option<Error>> = Locked::default();
         on_threads(threads, rows.clone().step_by(band_rows as usize), |first| {
             let band = first..rows.end.min(first + band_rows);
-            let byte = |row: u32| (row - rows.start) as u64 * pitch as u64;
+            let byte = |row: u32| u64::from(row - rows.start) * pitch as u64;
             let mut view = match mapped.range(byte(band.start)..byte(band.end)) {
                 Ok(view) => view,
                 Err(error) => {
