@@ -12,13 +12,6 @@ use crate::headless::depth_image::DepthImage;
 use crate::headless::readback;
 use crate::host::threads::{Locked, on_threads};
 
-/// Bytes of a buffer that is kept: an image of 4K, at four bytes per pixel.
-const MOST_KEPT_BYTES: u64 = 1 << 25;
-
-/// Sizes of images whose buffers are kept, and how many of each: two frames may be on their way.
-const KEPT_SIZES: usize = 2;
-const KEPT: usize = 2;
-
 /// Bytes of a buffer at most, or one row; larger images come in several parts.
 const MOST_BYTES: u32 = 1 << 26;
 
@@ -27,11 +20,6 @@ const BAND_PIXELS: u32 = 1 << 16;
 
 /// Pixels that are made before they are copied: they fit the fastest cache.
 const PIXELS_AT_ONCE: usize = 1 << 12;
-
-/// The buffers of an engine.
-pub(super) fn staging() -> RowStaging {
-    RowStaging::new("hiz.depth.staging", KEPT_SIZES, KEPT, MOST_KEPT_BYTES)
-}
 
 impl DepthImage {
     /// Writes the rows that `make` makes, which gets the first row of some and room for them.

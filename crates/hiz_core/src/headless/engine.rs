@@ -10,7 +10,6 @@ use crate::gpu::row_staging::RowStaging;
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
 use crate::headless::answers::Answers;
 use crate::headless::clock::Timing;
-use crate::headless::converted;
 use crate::headless::images::Images;
 use crate::headless::joined::JoinedPool;
 use crate::headless::kept_depth::KeptDepth;
@@ -23,6 +22,12 @@ use crate::instances::InstancesId;
 
 /// Staging buffers of answers that are kept at most.
 const STAGING_KEPT: usize = 4;
+
+/// Bytes of a depth staging buffer that is kept: an image of 4K, at four bytes per pixel.
+const DEPTH_KEPT_BYTES: u64 = 1 << 25;
+/// Sizes of images whose buffers are kept, and how many of each: two frames may be on their way.
+const DEPTH_SIZES: usize = 2;
+const DEPTH_KEPT: usize = 2;
 
 /// A device, its queue and the pipelines on it.
 /// The last clone waits until the device is idle, and releases it.
@@ -182,7 +187,12 @@ impl Engine {
                 timing: Locked::default(),
                 clock: OnceLock::new(),
                 staging: StagingPool::new(STAGING_KEPT),
-                depth_staging: converted::staging(),
+                depth_staging: RowStaging::new(
+                    "hiz.depth.staging",
+                    DEPTH_SIZES,
+                    DEPTH_KEPT,
+                    DEPTH_KEPT_BYTES,
+                ),
                 device,
                 queue,
                 adapter: summary,
