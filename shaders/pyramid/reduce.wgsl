@@ -38,9 +38,18 @@ fn quads(level: Level, block: vec2<u32>) -> array<Ends4, BLOCK_QUADS> {
         return source_quads(block);
     }
     let y = BLOCK_QUADS * block.y;
-    return array<Ends4, BLOCK_QUADS>(
-        stored_quads(level, block.x, y), stored_quads(level, block.x, y + 1u),
-        stored_quads(level, block.x, y + 2u), stored_quads(level, block.x, y + 3u));
+    if CHUNKS == 1u {
+        return array<Ends4, BLOCK_QUADS>(
+            stored_quads(level, block.x, y), stored_quads(level, block.x, y + 1u),
+            stored_quads(level, block.x, y + 2u), stored_quads(level, block.x, y + 3u));
+    }
+    // Each load chooses among the chunks, so a loop keeps the choices few.
+    // Without it SwiftShader compiles for ten seconds and more, and with it for 0.3 s.
+    var rows: array<Ends4, BLOCK_QUADS>;
+    for (var i = 0u; i < BLOCK_QUADS; i += 1u) {
+        rows[i] = stored_quads(level, block.x, y + i);
+    }
+    return rows;
 }
 
 fn store_pair(level: Level, x: u32, y: u32, pair: Ends2) {
