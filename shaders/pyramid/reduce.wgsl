@@ -63,10 +63,18 @@ fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
     if FIRST == 1u {
         let half = pyramid.levels[source_number + 1u];
         let row = half.offset + BLOCK_QUADS * (block.y * half.stride + block.x);
-        store_ends4(row, rows[0]);
-        store_ends4(row + half.stride, rows[1]);
-        store_ends4(row + 2u * half.stride, rows[2]);
-        store_ends4(row + 3u * half.stride, rows[3]);
+        if CHUNKS == 1u {
+            store_ends4(row, rows[0]);
+            store_ends4(row + half.stride, rows[1]);
+            store_ends4(row + 2u * half.stride, rows[2]);
+            store_ends4(row + 3u * half.stride, rows[3]);
+        } else {
+            // As for loads, a loop keeps the choices of a chunk few.
+            var kept = rows;
+            for (var i = 0u; i < BLOCK_QUADS; i += 1u) {
+                store_ends4(row + i * half.stride, kept[i]);
+            }
+        }
         if source_number + 1u >= last {
             return;
         }
