@@ -243,3 +243,53 @@ def test_points_of_one_pixel_each_are_hinted_at() -> None:
         hizvk.depth_from_points(dense, CAMERA)
         hizvk.depth_from_points(hizvk.Points(points.positions[:9]), CAMERA)
         hizvk.depth_from_points(hizvk.Points(np.zeros((0, 3))), CAMERA)
+
+
+def test_angles_in_radians_for_boxes() -> None:
+    """Quarter and half turns of data sets, with two digits; few boxes turn by 1.57 degrees."""
+    centers = np.zeros((4, 3))
+    for yaws in ([1.57, -1.57, 3.14, 0.0], [1.58, -1.56, 0.0, 0.0], 1.5708):
+        with pytest.warns(hizvk.HizWarning, match=r"^yaw_deg: most of the .* np\.degrees") as seen:
+            hizvk.OrientedBoxes.from_yaw(centers, 1.0, yaws, up=(0, 0, 1))
+        assert seen[0].filename == __file__
+    for yaws in ([90.0, 180.0, 1.57, 0.0], [0.0] * 4, [1.0, -2.0, 1.57, 3.0], -90.0):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            hizvk.OrientedBoxes.from_yaw(centers, 1.0, yaws, up=(0, 0, 1))
+
+
+def test_every_pose_that_fits_is_named() -> None:
+    """5 m behind the eye: turned round, and as the inverse, the pose looks at the balls."""
+    pose = np.eye(4)
+    pose[2, 3] = -5.0
+    camera = hizvk.Camera.from_opencv(
+        [[50.0, 0, 32], [0, 50.0, 24], [0, 0, 1]],
+        pixel_center="half",
+        camera_from_world=pose,
+        size=SIZE,
+        near=0.1,
+    )
+    # Their depths are -5 as given, 5 with y and z turned round, and 5 from an eye at z = -5.
+    (text,) = said(
+        hizvk.Spheres([(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)], 0.05), np.full(SIZE, 50.0), camera
+    )
+    assert "2 would be inside of it with the camera's y and z turned round" in text
+    assert ", or 2 would be inside of it with the pose as world_from_camera" in text
+
+
+def test_most_bounds_invalid(device: hizvk.Device) -> None:
+    low = np.tile([-0.1, -0.1, -5.0], (50, 1))
+    high = low + np.array([0.2, -0.2, 0.2])  # the y of both corners are swapped
+    high[0] = low[0] + 0.2
+    (text,) = said(hizvk.Boxes(low, high), np.full(SIZE, 50.0))
+    assert text.startswith("bounds: 49 of 50 are invalid, so they are kept")
+    few = high.copy()
+    few[1:40] = low[1:40] + 0.2
+    assert said(hizvk.Boxes(low, few), np.full(SIZE, 50.0)) == []
+
+
+def test_a_word_of_other_libraries_is_no_option() -> None:
+    balls = crowd(2.0, 3.0)
+    for word, meant in (("depth_scale", "scale"), ("units", "scale"), ("footprnt", "footprint")):
+        with pytest.raises(TypeError, match=f"^{word}: .* the closest is {meant}, and all are"):
+            hizvk.visible(balls, CAMERA, depth=room(2.0, 3.0), kind="z", **{word: 1})  # type: ignore[call-overload]

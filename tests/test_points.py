@@ -524,3 +524,14 @@ def test_a_tolerance_works_both_ways_for_what_surely_shows(device: hizvk.Device)
     told = device.cull(device.instances(points), camera, hiz).verdicts
     names = [hizvk.Verdict(code).name for code in told]
     assert names == ["UNOCCLUDED", "VISIBLE", "VISIBLE", "OCCLUDED"]
+
+
+def test_colours_come_from_the_device_of_the_depth_image(device: hizvk.Device) -> None:
+    """A drawn image belongs to a device, and nobody has to name it again."""
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(48, 64), near=0.1)
+    wall = device.occluders([(-9, -9, -5), (9, -9, -5), (0, 9, -5)], [[0, 1, 2]])
+    depth = device.render_depth(wall, camera)
+    points = hizvk.Points([(0.0, 0.0, -4.0), (0.0, 0.0, -6.0)])
+    white = np.full((48, 64, 3), 255, np.uint8)
+    seen = hizvk.colour_points(points, [(camera, depth, white)])
+    assert seen.counts.tolist() == [1, 0]

@@ -468,3 +468,20 @@ def test_without_matplotlib_the_message_has_the_line() -> None:
     )
     assert done.stdout.startswith("a figure needs matplotlib, which is not installed: ")
     assert install_line("viz") in done.stdout
+
+
+@pytest.mark.parametrize("outputs", [["pixels"], ["indices"], ["draws"], ["mask"], ["verdicts"]])
+def test_a_notebook_shows_a_result_of_any_outputs(
+    device: hizvk.Device, outputs: list[hizvk.OutputName]
+) -> None:
+    """One ball before a wall, one behind it: what tells so is counted, however it was asked."""
+    view = camera()
+    hiz = device.pyramid(np.full(view.size, 5.0), view, kind="z")
+    balls = device.instances(hizvk.Spheres([(0, 0, -4), (0, 0, -9)], 0.2))
+    seen = device.cull(balls, view, hiz, outputs=outputs)
+    page = seen._repr_html_()
+    assert "<img" in page
+    if outputs != ["draws"]:
+        names = {"pixels": ("may show a pixel", "shows none")}.get(outputs[0])
+        for name in names or ("kept",):
+            assert re.search(rf"{name}</td>\s*<td[^>]*>1<", page), (name, page[-800:])

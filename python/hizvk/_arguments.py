@@ -17,7 +17,7 @@ import operator
 import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import Any, ParamSpec, TypeAlias, TypeVar
+from typing import Any, Final, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -90,6 +90,19 @@ def explained(texts: Mapping[str, str]) -> Callable[[Callable[P, T]], Callable[P
     return decorate
 
 
+#: What is meant by words that others use, and that look like another parameter.
+_MEANT: Final = {
+    "depth_scale": "scale",
+    "units": "scale",
+    "unit": "scale",
+    "depth_kind": "kind",
+    "workers": "executor",
+    "n_jobs": "executor",
+    "processes": "executor",
+    "threads": "executor",
+}
+
+
 def refuse_unknown(keywords: Iterable[str], known: Collection[str]) -> None:
     """A `TypeError` for the first keyword that is not known; it names the closest one that is."""
     for name in keywords:
@@ -97,7 +110,8 @@ def refuse_unknown(keywords: Iterable[str], known: Collection[str]) -> None:
             # Loaded here: only this error needs it.
             from difflib import get_close_matches
 
-            closest = get_close_matches(name, known, 1, cutoff=0.0)[0]
+            meant = _MEANT.get(name)
+            closest = meant if meant in known else get_close_matches(name, known, 1, cutoff=0.0)[0]
             raise TypeError(
                 f"{name}: expected no such parameter; the closest is {closest}, "
                 f"and all are {', '.join(known)}"

@@ -6,12 +6,39 @@ A camera or a box has exactly this matrix, so a cull need not cover the rounding
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+import warnings
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from .errors import HizWarning
+
 if TYPE_CHECKING:
     import numpy.typing as npt
+
+
+#: Data sets write angles with two digits, so 1.56 to 1.58 are a quarter turn in radians.
+QUARTER_ROOM: Final = 0.015
+
+
+def warn_of_radians(name: str, degrees: npt.NDArray[Any], *, stacklevel: int = 4) -> None:
+    """Warns of angles that are turns of boxes in radians: most are quarter or half turns.
+
+    Nobody turns most boxes by 1.57 or 3.14 degrees.
+    """
+    size = np.abs(np.asarray(degrees, np.float64))
+    turned = size[size > 0.0]
+    quarters = np.round(turned / (math.pi / 2.0))
+    is_near = (quarters >= 1.0) & (np.abs(turned - quarters * (math.pi / 2.0)) < QUARTER_ROOM)
+    if turned.size and turned.max() < math.pi + QUARTER_ROOM and 2 * is_near.sum() > turned.size:
+        warnings.warn(
+            f"{name}: most of the {turned.size:,} turned boxes are turned by 1.57 or 3.14 degrees, "
+            "which are a quarter and half a turn in radians; if that is meant, pass "
+            "np.degrees(yaw)",
+            HizWarning,
+            stacklevel=stacklevel,
+        )
 
 
 def from_quaternions(w: Any, x: Any, y: Any, z: Any) -> npt.NDArray[np.float64]:

@@ -239,6 +239,7 @@ class OrientedBoxes:
         centers = _arguments.floats("centers", centers, ("N", 3))
         half_sizes = _for_each("half_sizes", half_sizes, len(centers))
         angles = _arguments.floats_or_scalar("yaw_deg", yaw_deg, len(centers))
+        _rotations.warn_of_radians("yaw_deg", angles)
         axis = _arguments.vector("up", up)
         if not any(axis):
             raise ValueError(f"up: expected a direction, got {axis}")

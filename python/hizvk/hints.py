@@ -123,10 +123,11 @@ class Question:
                     'or outside of the view; coverage="area" keeps small ones',
                 )
             return _outside(stats.tested, self.camera, bounds)
-        if stats.invalid == stats.tested:
+        if 2 * stats.invalid > stats.tested:
+            share = "all" if stats.invalid == stats.tested else f"{stats.invalid:,} of"
             return (
-                f"bounds: all {stats.tested:,} are invalid, so all are kept: a number is NaN or "
-                "infinite, a size is negative, or min is above max",
+                f"bounds: {share} {stats.tested:,} are invalid, so they are kept: a number is NaN "
+                "or infinite or too large for float32, a size is negative, or min is above max",
             )
         if stats.kept == stats.invalid:
             return self._all_hidden(bounds) if stats.occluded else ()
@@ -186,12 +187,14 @@ class Question:
 def _outside(count: int, camera: Camera, bounds: Bounds | None) -> tuple[str, ...]:
     all_ = f"all {count:,} lie" if count > 1 else "the only one lies"
     said = f"bounds, camera: {all_} outside of the view"
-    for what, other in posed_otherwise(camera) if bounds is not None else ():
-        seen = _in_view(other, bounds)
-        if seen:
-            return (f"{said}, and {seen:,} would be inside of it with {what}",)
     if count == 1:
         return ()  # a single instance is often outside, with nothing wrong
+    others = posed_otherwise(camera) if bounds is not None else []
+    fits = [(what, seen) for what, other in others if (seen := _in_view(other, bounds))]
+    if fits:
+        # Several may fit, and nothing here tells which one is meant.
+        found = ", or ".join(f"{seen:,} would be inside of it with {what}" for what, seen in fits)
+        return (f"{said}, and {found}",)
     return (
         f"{said}; if that is not meant, check the pose's direction (camera_from_world or "
         "world_from_camera), its convention (from_opencv looks along +z, from_opengl along -z) "

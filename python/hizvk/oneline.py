@@ -50,6 +50,9 @@ class _Default:
 #: The counts that hints look at.
 _COUNTS = Outputs(mask=False, verdicts=True, indices=False, draws=False)
 
+#: The parameters of `visible` that are no options.
+_OWN = ("depth", "kind", "scale", "invalid", "tolerance", "device", "options")
+
 _defaults: dict[int, _Default] = {}
 
 
@@ -140,7 +143,7 @@ def visible(
     """
     kind_and_arrays = as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
-    options = cull_options(options, keywords)
+    options = cull_options(options, keywords, _OWN)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
     if isinstance(depth, DepthImage):
@@ -181,7 +184,7 @@ def visible(
     # Points have a guard of their own.
     points = options.coverage == "sample" and not isinstance(bounds, Points) and are_points(bounds)
     # What hides some of the first bounds gives no cause for a hint.
-    if points or not counts.occluded:
+    if points or not counts.occluded or 2 * counts.invalid > counts.tested:
         tally: Counted = Tally.of(counts)
         question = Question(camera, pyramid_again(), options, points)
         if tally.tested < len(bounds) and not points:

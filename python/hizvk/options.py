@@ -487,12 +487,17 @@ _OUTPUTS: Final = Outputs()
 _NAMED: Final[dict[frozenset[str], Outputs]] = {}
 
 
-def cull_options(options: object, keywords: Mapping[str, Any]) -> CullOptions:
-    """The options (None: the defaults), with `keywords` in the place of their fields."""
+def cull_options(
+    options: object, keywords: Mapping[str, Any], own: Collection[str] = ()
+) -> CullOptions:
+    """The options (None: the defaults), with `keywords` in the place of their fields.
+
+    `own` has more parameters of the caller's function, for the error of an unknown one.
+    """
     chosen = _OPTIONS
     if options is not None:
         chosen = _arguments.instance("options", options, CullOptions, "a CullOptions or None")
-    _arguments.refuse_unknown(keywords, OptionKeywords.__annotations__)
+    _arguments.refuse_unknown(keywords, (*own, *OptionKeywords.__annotations__))
     return _replaced(chosen, keywords) if keywords else chosen
 
 

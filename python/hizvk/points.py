@@ -18,7 +18,7 @@ from ._core import depth_of_points
 from ._types import ColourWeight, DepthKind, Sampling, words
 from .bounds import Points
 from .camera import Camera
-from .device import Device
+from .device import Device, maker_of
 from .errors import HizWarning
 from .oneline import default_device
 from .options import Outputs, cull_options
@@ -107,7 +107,7 @@ def colour_points(
         ``"near"``: by the inverse square of its view depth.
         An orthographic camera shows nothing larger from nearby, so there it is as ``"equal"``.
     device : Device, optional
-        None: the default device of `visible`.
+        None: the device of the first view's depth, else the default one of `visible`.
     options : CullOptions, optional
         How the culls decide; None takes the defaults, which are a guard of half a pixel for points.
     progress : bool or function, optional
@@ -146,11 +146,10 @@ def colour_points(
     if not isinstance(views, Iterable) or isinstance(views, (str, bytes, np.ndarray)):
         got = _arguments.describe(views)
         raise TypeError(f"views: expected an iterable of (Camera, depth, image), got {got}")
-    maker = default_device() if device is None else device
+    maker, cloud = device, None
     count = len(points)
     colours, weights = np.zeros(3 * count, np.float32), np.zeros(count, np.float32)
     counts = np.zeros(count, np.uint32)
-    cloud = maker.instances(points)
     meaning: dict[str, Any] = {
         "kind": kind, "scale": scale, "invalid": invalid, "tolerance": tolerance,
     }  # fmt: skip
@@ -158,6 +157,10 @@ def colour_points(
     with Progress(progress, "colouring points", total) as steps:
         for view in views:
             camera, depth, image = _view(view)
+            if maker is None:
+                maker = maker_of(depth) if isinstance(depth, DepthImage) else default_device()
+            if cloud is None:
+                cloud = maker.instances(points)
             if isinstance(depth, DepthImage):
                 hiz = maker.pyramid(depth)
             else:

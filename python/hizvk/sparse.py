@@ -54,7 +54,8 @@ def fill_depth(
     radius_px : int
         0 to 1024.
         The window has to hold a few measured pixels everywhere.
-        If a share s of the pixels is measured, about ``1.5 / sqrt(s)``.
+        If a share s of the pixels is measured, about ``1.5 / sqrt(s)`` where they stand in rows
+        and columns, and ``3 / sqrt(s)`` where they are scattered.
     kind : "z" or "distance"
         What the numbers are, as in `Device.pyramid`.
     invalid : collection of float, optional

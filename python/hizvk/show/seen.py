@@ -170,12 +170,39 @@ def _classes(result: Any) -> tuple[npt.NDArray[np.uint8] | None, tuple[str, ...]
         try:
             mask = np.asarray(result.mask)
         except ValueError:
-            return None, ("", "", "")
-        return np.where(mask, KEPT, HIDDEN).astype(np.uint8), (CLASSES[KEPT], "culled", "")
+            return _classes_of_parts(result)
+        return _of_mask(mask), (CLASSES[KEPT], "culled", "")
     classes = np.full(len(verdicts), KEPT, np.uint8)
     classes[verdicts == _OCCLUDED] = HIDDEN
     classes[verdicts == _OUTSIDE] = OUTSIDE
     return classes, CLASSES
+
+
+def _classes_of_parts(
+    result: Any,
+) -> tuple[npt.NDArray[np.uint8] | None, tuple[str, ...]]:
+    """The same of a cull that made counts of pixels or a list alone."""
+    try:
+        pixels = result.pixels
+    except ValueError:
+        pass
+    else:
+        may_show = pixels["touched"] > pixels["hidden"]
+        return _of_mask(may_show), ("may show a pixel", "shows none", "")
+    try:
+        listed = np.asarray(result.indices)
+        is_whole = result.demand == len(listed)
+    except ValueError:  # no list, or a full one
+        return None, ("", "", "")
+    if not is_whole:
+        return None, ("", "", "")
+    mask = np.zeros(len(result), np.bool_)
+    mask[listed] = True
+    return _of_mask(mask), (CLASSES[KEPT], "culled", "")
+
+
+def _of_mask(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+    return np.where(mask, KEPT, HIDDEN).astype(np.uint8)
 
 
 def _hints(result: Any) -> tuple[str, ...]:

@@ -241,6 +241,8 @@ pub(crate) fn write_boxes(
     Ok(())
 }
 
+const _: () = assert!((RECORDS_PER_ROW as usize).is_multiple_of(GROUP), "rows hold whole groups");
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -285,5 +287,3 @@ mod tests {
         }
     }
 }
-
-const _: () = assert!((RECORDS_PER_ROW as usize).is_multiple_of(GROUP), "rows hold whole groups");
