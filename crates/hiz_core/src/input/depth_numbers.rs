@@ -93,8 +93,9 @@ pub(super) fn of_half(bits: u16) -> f32 {
     // The sign stays on top, and its copies below it are cut off.
     let moved = i32::from(bits.cast_signed()).cast_unsigned() << 13 & 0x8fff_e000;
     let number = f32::from_bits(moved) * UP * UP * DOWN;
-    // An exponent of ones with a fraction.
-    if bits & 0x7fff > 0x7c00 { f32::NAN } else { number }
+    // All ones above an exponent of ones with a fraction, which makes NaN of infinity.
+    let nan = (0x7c00 - i32::from(bits & 0x7fff)) >> 31;
+    f32::from_bits(number.to_bits() | nan.cast_unsigned() & f32::NAN.to_bits())
 }
 
 #[cfg(test)]
