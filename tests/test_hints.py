@@ -252,7 +252,13 @@ def test_angles_in_radians_for_boxes() -> None:
         with pytest.warns(hizvk.HizWarning, match=r"^yaw_deg: most of the .* np\.degrees") as seen:
             hizvk.OrientedBoxes.from_yaw(centers, 1.0, yaws, up=(0, 0, 1))
         assert seen[0].filename == __file__
-    for yaws in ([90.0, 180.0, 1.57, 0.0], [0.0] * 4, [1.0, -2.0, 1.57, 3.0], -90.0):
+    for yaws in (
+        [90.0, 180.0, 1.57, 0.0],
+        [0.0] * 4,
+        [0.0, np.nan, np.inf, 2.0],
+        [1.0, -2.0, 1.57, 3.0],
+        -90.0,
+    ):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             hizvk.OrientedBoxes.from_yaw(centers, 1.0, yaws, up=(0, 0, 1))

@@ -28,7 +28,7 @@ def warn_of_radians(name: str, degrees: npt.NDArray[Any], *, stacklevel: int = 4
     Nobody turns most boxes by 1.57 or 3.14 degrees.
     """
     size = np.abs(np.asarray(degrees, np.float64))
-    turned = size[size > 0.0]
+    turned = size[np.isfinite(size) & (size > 0.0)]
     quarters = np.round(turned / (math.pi / 2.0))
     is_near = (quarters >= 1.0) & (np.abs(turned - quarters * (math.pi / 2.0)) < QUARTER_ROOM)
     if turned.size and turned.max() < math.pi + QUARTER_ROOM and 2 * is_near.sum() > turned.size:
