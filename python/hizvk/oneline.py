@@ -16,6 +16,7 @@ from .device import Device, maker_of
 from .errors import HizWarning
 from .hints import Counted, Question, Tally, middles_of
 from .options import Outputs, cull_options
+from .other_cameras import other_camera
 from .resources import DepthImage, Pyramid
 from .unit_hints import all_are_hidden, sampled
 
@@ -149,9 +150,7 @@ def visible(
     if isinstance(depth, DepthImage):
         device = maker_of(depth) if device is None else device
         if camera != depth.camera:
-            raise ValueError(
-                f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}"
-            )
+            raise other_camera("camera", "the camera of depth", depth.camera, camera)
         for name, value in (("kind", kind), ("invalid", invalid), ("tolerance", tolerance)):
             if value is not None:
                 got = _arguments.describe(value)

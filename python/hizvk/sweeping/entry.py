@@ -174,6 +174,7 @@ def sweep(
     faces: Any = _arguments.choice("cull", cull, words(FaceCull))
     rows = arguments.groups_of(groups, len(views))
     runner, engine = arguments.executor_of(executor)
+    arguments.refuse_unsendable(depths, runner)
     per_block = arguments.block_of(block, len(views))
     chosen = cull_options(options, keywords)
     if chosen.shadow is not None:
