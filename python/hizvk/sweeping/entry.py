@@ -103,8 +103,8 @@ def sweep(
     depths : sequence of V arrays, or function
         Instead of `occluders`: the depth image of each view.
         A function takes the number of a view and returns its array.
-        It runs where the block runs, so it can load a file there; other processes need one that can
-        be pickled.
+        It runs where the block runs, so it can load a file there.
+        Other processes need one of a module that they can import, no lambda.
     kind, scale, invalid, tolerance
         What the numbers of `depths` are, as in `Device.pyramid`.
     cull : "none", "back" or "front"
