@@ -255,6 +255,16 @@ def test_plain_arrays_are_told_which_bounds_they_look_like() -> None:
         (lambda: hizvk.Points(xyz=CORNERS), "xyz", "positions"),  # type: ignore[call-arg]
         (lambda: hizvk.Mesh(CORNERS, faces=[[0, 1, 2]]), "faces", "triangles"),  # type: ignore[call-arg]
         (lambda: look_at(fov_y_deg=60, colour=1), "colour", None),
+        (
+            lambda: hizvk.Device().pyramid(DEPTH, CAMERA, kind="z", depth_scale=0.001),  # type: ignore[call-overload]
+            "depth_scale",
+            "scale",
+        ),
+        (
+            lambda: hizvk.Device().occluders(vertices=CORNERS, faces=[[0, 1, 2]]),  # type: ignore[call-overload]
+            "faces",
+            "triangles",
+        ),
     ],
 )
 def test_a_word_that_is_no_parameter(call: Callable[[], Any], word: str, meant: str) -> None:

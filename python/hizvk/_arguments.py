@@ -74,7 +74,8 @@ def explained(
 
     def decorate(maker: Callable[P, T]) -> Callable[P, T]:
         parameters = inspect.signature(maker).parameters
-        known = [name for name in parameters if name not in ("self", "cls")]
+        known = frozenset(parameters)
+        told = [name for name in parameters if name not in ("self", "cls")]
         needed = [
             name
             for name in texts
@@ -83,12 +84,12 @@ def explained(
 
         @functools.wraps(maker)
         def checked(*args: P.args, **kwargs: P.kwargs) -> T:
-            for name in [name for name in needed if name not in kwargs] + sorted(
-                kwargs.keys() - parameters.keys()
-            ):
-                if name in texts:
-                    raise TypeError(f"{name}: {texts[name]}")
-            refuse_unknown(kwargs, known)
+            missing = [name for name in needed if name not in kwargs] if needed else needed
+            if missing or not known.issuperset(kwargs):
+                for name in [*missing, *sorted(kwargs.keys() - known)]:
+                    if name in texts:
+                        raise TypeError(f"{name}: {texts[name]}")
+                refuse_unknown(kwargs, told)
             return maker(*args, **kwargs)
 
         return checked

@@ -132,6 +132,7 @@ class Device(StaysInProcess):
         """The largest height or width of a depth image on this device."""
         return self._engine.max_image_side()
 
+    @_arguments.explained()
     def instances(
         self,
         bounds: Bounds,
@@ -214,6 +215,7 @@ class Device(StaysInProcess):
         cull: FaceCull = "none",
     ) -> Occluders: ...
 
+    @_arguments.explained()
     def occluders(
         self,
         vertices: Any,
@@ -282,6 +284,7 @@ class Device(StaysInProcess):
         max_occluders: int | None = None,
     ) -> tuple[int, int, int, int] | None: ...
 
+    @_arguments.explained()
     def render_depth(
         self,
         occluders: Occluders,
@@ -432,6 +435,7 @@ class Device(StaysInProcess):
         depths: Depths = "farthest",
     ) -> Pyramid: ...
 
+    @_arguments.explained()
     def pyramid(
         self,
         depth: Any,
