@@ -1,6 +1,6 @@
-//! Vector algebra, the Morton curve, rounding, memory and threads on the host.
+//! Vector algebra, the Morton curve, rounding, memory, threads and wide vectors on the host.
 //!
-//! This room knows numbers and the standard library alone: no camera, no instance, no device.
+//! This room knows numbers alone: no camera, no instance, no device.
 //! Every other room may use it.
 
 pub(crate) mod curve;
@@ -9,3 +9,4 @@ pub(crate) mod linear;
 pub(crate) mod memory;
 pub(crate) mod rounding;
 pub(crate) mod threads;
+pub(crate) mod vectors;

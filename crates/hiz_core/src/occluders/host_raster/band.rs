@@ -50,6 +50,9 @@ pub(super) struct Band {
     first: Vec<f32>,
     risen: Vec<u32>,
     rises: Vec<Rise>,
+    /// By tile: where its layers are in `layers`; 0 until it needs them.
+    slots: Vec<u32>,
+    /// Few tiles have layers, so theirs lie close together and stay in the caches.
     layers: Vec<Layers>,
     pixels: Vec<f32>,
 }
@@ -78,7 +81,8 @@ impl Band {
             first: vec![0.0; count],
             risen: vec![0; count],
             rises: Vec::new(),
-            layers: vec![Layers::default(); count],
+            slots: vec![0; count],
+            layers: vec![Layers::default()],
             pixels: vec![0.0; stride * (bottom - top) as usize],
         }
     }
@@ -92,8 +96,10 @@ impl Band {
             + size_of_val(&self.is_stale[..])
             + size_of_val(&self.is_cell_stale[..])
             + size_of_val(&self.risen[..])
+            + size_of_val(&self.slots[..]);
+        let lists = size_of_val(&self.stale[..])
+            + size_of_val(&self.rises[..])
             + size_of_val(&self.layers[..]);
-        let lists = size_of_val(&self.stale[..]) + size_of_val(&self.rises[..]);
         (floats + tiles + lists) as u64
     }
 
@@ -106,6 +112,8 @@ impl Band {
         self.cells.fill(0.0);
         self.is_cell_stale.fill(false);
         self.rises.clear();
+        self.slots.fill(0);
+        self.layers.truncate(1);
     }
 
     /// Whether nothing within `extent` would show in this band.
@@ -195,11 +203,17 @@ impl Band {
             farthest: &mut self.farthest[index],
             nearest: &mut self.nearest[index],
             state: &mut self.states[index],
-            layers: &mut self.layers[index],
+            layers: &mut self.layers[self.slots[index] as usize],
             pixels: &mut self.pixels[first..],
             stride: self.stride,
             fault: self.image.fault,
         }
+    }
+
+    /// The layers of a tile, if its state says that it has some.
+    #[inline(always)]
+    fn layers_of(&self, index: usize) -> &Layers {
+        &self.layers[self.slots[index] as usize]
     }
 
     /// The plane of a tile that is [`FULL`].
@@ -208,9 +222,13 @@ impl Band {
         Plane::at(self.first[index], &self.rises[self.risen[index] as usize])
     }
 
-    /// Makes the plane of a tile that is [`FULL`] a layer.
+    /// Gives a tile room for layers, and makes the plane of one that is [`FULL`] a layer.
     #[inline(always)]
     fn settle(&mut self, index: usize) {
+        if self.slots[index] == 0 {
+            self.slots[index] = self.layers.len() as u32;
+            self.layers.push(Layers::default());
+        }
         if self.states[index] == FULL {
             let plane = self.full_plane(index);
             self.tile(index).settle(plane);
@@ -220,7 +238,9 @@ impl Band {
     /// Turns whatever a tile is into pixels.
     #[inline(never)]
     fn expand(&mut self, index: usize) {
-        self.settle(index);
+        if self.states[index] == FULL {
+            self.settle(index);
+        }
         self.tile(index).expand();
     }
 
@@ -471,8 +491,11 @@ impl Band {
             let shifted = u32::from(is_planted!(self.image.fault, MasksShifted));
             // A column's rows run from its byte's highest bit.
             let mask = mask >> shifted & (Mask::MAX / 255 * (255 >> shifted));
+            if mask == 0 {
+                return;
+            }
             self.settle(index);
-            if mask == 0 || self.tile(index).add_layer(mask, plane, (low, high)) {
+            if self.tile(index).add_layer(mask, plane, (low, high)) {
                 return;
             }
         }
@@ -518,7 +541,7 @@ impl Band {
         let tile = row * self.across + column;
         match self.states[tile] {
             CLEAR | FULL | PIXELS => Some(self.farthest[tile]),
-            state => (!is_covered(state, &self.layers[tile])).then_some(0.0),
+            state => (!is_covered(state, self.layers_of(tile))).then_some(0.0),
         }
     }
 
@@ -532,7 +555,7 @@ impl Band {
                 self.pixels[first..].as_chunks().0[0]
             }
             FULL => self.full_plane(tile).row(y),
-            state => row_of_layers(state, &self.layers[tile], y, self.image.fault),
+            state => row_of_layers(state, self.layers_of(tile), y, self.image.fault),
         }
     }
 
@@ -582,7 +605,7 @@ impl Band {
                         fill(block, depth_of, |y| plane.row(y));
                     }
                     state => {
-                        let layers = &self.layers[tile];
+                        let layers = self.layers_of(tile);
                         fill(block, depth_of, |y| row_of_layers(state, layers, y, fault));
                     }
                 }
