@@ -157,11 +157,16 @@ def test_depth_that_cannot_hide_is_hinted_at(device: hizvk.Device, reversed_z: b
     balls = hizvk.Spheres(MIDDLES, 0.5)
     metres = np.full((64, 64), 4.0)
     assert hinted(balls, camera, metres, device=device) == []
-    for empty in (np.zeros((64, 64)), metres * 1000.0, np.full((64, 64), np.nan)):
+    for empty in (
+        np.zeros((64, 64)),
+        metres * 1000.0,
+        np.full((64, 64), np.nan),
+        np.full((64, 64), np.inf),
+    ):
         (text,) = hinted(balls, camera, empty, device=device)
         assert text.startswith(
             "depth: every pixel is far, so nothing can be hidden; "
-            "if something should be there, check"
+            "if something should be there, check its numbers, kind and scale"
         )
     sparse = np.zeros((64, 64))
     sparse[::5, ::5] = 4.0  # 13 x 13 of 4,096
@@ -169,8 +174,10 @@ def test_depth_that_cannot_hide_is_hinted_at(device: hizvk.Device, reversed_z: b
     assert text.startswith("depth: 4.1 % of the pixels have a depth")
     lines = np.zeros((64, 64))
     lines[::5] = 4.0
-    (text,) = hinted(balls, camera, lines, device=device)
-    assert text.startswith("depth: 20.3 % of the pixels have a depth")
+    # Each lies beside others of its line, so it is blocks of 2x2 that are missing.
+    for bars in (lines, lines.T):
+        (text,) = hinted(balls, camera, bars, device=device)
+        assert text.startswith("depth: 20.3 % of the pixels have a depth, and hardly any 2x2 of")
     # Nothing could be hidden, whatever the depth.
     (text,) = hinted(hizvk.Spheres(MIDDLES, np.nan), camera, sparse, device=device)
     assert text.startswith(f"bounds: all {len(MIDDLES)} are invalid")

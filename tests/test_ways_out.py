@@ -255,6 +255,29 @@ def test_plain_arrays_are_told_which_bounds_they_look_like() -> None:
         (lambda: hizvk.Points(xyz=CORNERS), "xyz", "positions"),  # type: ignore[call-arg]
         (lambda: hizvk.Mesh(CORNERS, faces=[[0, 1, 2]]), "faces", "triangles"),  # type: ignore[call-arg]
         (lambda: look_at(fov_y_deg=60, colour=1), "colour", None),
+        (
+            lambda: hizvk.Device().pyramid(DEPTH, CAMERA, kind="z", depth_scale=0.001),  # type: ignore[call-overload]
+            "depth_scale",
+            "scale",
+        ),
+        (
+            lambda: hizvk.Device().occluders(vertices=CORNERS, faces=[[0, 1, 2]]),  # type: ignore[call-overload]
+            "faces",
+            "triangles",
+        ),
+        # Of functions that take options, too, their own parameters count.
+        (lambda: hizvk.sweep(BALLS, [CAMERA], depth=[DEPTH], kind="z"), "depth", "depths"),  # type: ignore[call-arg]
+        (lambda: hizvk.recommend(BALLS, CAMERA, occluder=None), "occluder", "occluders"),  # type: ignore[call-arg]
+        (lambda: hizvk.visible(BALLS, CAMERA, depth=DEPTH, kinds="z"), "kinds", "kind"),  # type: ignore[call-arg]
+        (lambda: colour(np.zeros((6, 8, 3), np.uint8), device_=1), "device_", "device"),
+        (lambda: culled(hizvk.Device(), output=["mask"]), "output", "outputs"),
+        (lambda: hizvk.Tolerance(absolute=0.1), "absolute", "abs"),  # type: ignore[call-arg]
+        (lambda: hizvk.CullOptions(foot_print=4), "foot_print", "footprint"),  # type: ignore[call-arg]
+        (lambda: hizvk.Outputs(masks=True), "masks", "mask"),  # type: ignore[call-arg]
+        (lambda: hizvk.LodBySize(pixel=[4.0]), "pixel", "pixels"),  # type: ignore[call-arg]
+        (lambda: hizvk.DirectionalLight((0, 0, -1), radius=1), "radius", "angular_radius_deg"),  # type: ignore[call-arg]
+        (lambda: hizvk.Device(name="llvmpipe"), "name", "adapter"),  # type: ignore[call-arg]
+        (lambda: hizvk.cube((0, 0, 0), size=8, znear=0.1), "znear", "near"),  # type: ignore[call-arg]
     ],
 )
 def test_a_word_that_is_no_parameter(call: Callable[[], Any], word: str, meant: str) -> None:

@@ -74,7 +74,8 @@ def explained(
 
     def decorate(maker: Callable[P, T]) -> Callable[P, T]:
         parameters = inspect.signature(maker).parameters
-        known = [name for name in parameters if name not in ("self", "cls")]
+        known = frozenset(parameters)
+        told = [name for name in parameters if name not in ("self", "cls")]
         needed = [
             name
             for name in texts
@@ -83,12 +84,12 @@ def explained(
 
         @functools.wraps(maker)
         def checked(*args: P.args, **kwargs: P.kwargs) -> T:
-            for name in [name for name in needed if name not in kwargs] + sorted(
-                kwargs.keys() - parameters.keys()
-            ):
-                if name in texts:
-                    raise TypeError(f"{name}: {texts[name]}")
-            refuse_unknown(kwargs, known)
+            missing = [name for name in needed if name not in kwargs] if needed else needed
+            if missing or not known.issuperset(kwargs):
+                for name in [*missing, *sorted(kwargs.keys() - known)]:
+                    if name in texts:
+                        raise TypeError(f"{name}: {texts[name]}")
+                refuse_unknown(kwargs, told)
             return maker(*args, **kwargs)
 
         return checked
@@ -123,24 +124,48 @@ _MEANT: Final[Mapping[str, tuple[str, ...]]] = {
     # Of meshes and points.
     **dict.fromkeys(("faces", "indices"), ("triangles",)),
     **dict.fromkeys(("points", "xyz"), ("positions", "vertices")),
+    # Of the others.
+    **dict.fromkeys(("extents", "sizes", "dimensions", "half_extents"), ("half_sizes",)),
+    "absolute": ("abs",),
+    "relative": ("rel",),
+    "name": ("adapter",),
+    "depth_image": ("depth", "depths"),
+    "observer": ("eye",),
+    "radius": ("radii", "angular_radius_deg", "radius_px"),
 }
 #: Words that are less alike have nothing to do with each other.
 _ALIKE: Final = 0.5
 
 
-def refuse_unknown(keywords: Iterable[str], known: Collection[str]) -> None:
-    """A `TypeError` for the first keyword that is not known; it names the closest one that is."""
+def refuse_unknown(
+    keywords: Iterable[str], known: Collection[str], of: Callable[..., object] | None = None
+) -> None:
+    """A `TypeError` for the first keyword that is not known; it names the closest one that is.
+
+    `of` is the function that was called, whose own parameters are told, too.
+    """
     for name in keywords:
         if name not in known:
             # Loaded here: only this error needs it.
             from difflib import get_close_matches
 
-            meant = [word for word in _MEANT.get(name, ()) if word in known]
-            closest = (meant or get_close_matches(name, known, 1, cutoff=_ALIKE))[:1]
+            told = [*(_own_names(of) if of is not None else ()), *known]
+            meant = [word for word in _MEANT.get(name, ()) if word in told]
+            closest = (meant or get_close_matches(name, told, 1, cutoff=_ALIKE))[:1]
             which = "".join(f"the closest is {word}, and " for word in closest)
-            raise TypeError(
-                f"{name}: expected no such parameter; {which}all are {', '.join(known)}"
-            )
+            raise TypeError(f"{name}: expected no such parameter; {which}all are {', '.join(told)}")
+
+
+def _own_names(function: Callable[..., object]) -> list[str]:
+    """The names of a function's own parameters."""
+    parameters = inspect.signature(function).parameters.values()
+    return [one.name for one in parameters if one.kind is not inspect.Parameter.VAR_KEYWORD]
+
+
+def named(made: type[T]) -> type[T]:
+    """A decorator of data classes whose keywords are refused as those of `explained` are."""
+    made.__init__ = explained()(made.__init__)  # type: ignore[method-assign]
+    return made
 
 
 def _wrong_type(name: str, expected: str, value: object) -> TypeError:

@@ -51,9 +51,6 @@ class _Default:
 #: The counts that hints look at.
 _COUNTS = Outputs(mask=False, verdicts=True, indices=False, draws=False)
 
-#: The parameters of `visible` that are no options.
-_OWN = ("depth", "kind", "scale", "invalid", "tolerance", "device", "options")
-
 _defaults: dict[int, _Default] = {}
 
 
@@ -144,7 +141,7 @@ def visible(
     """
     kind_and_arrays = as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
-    options = cull_options(options, keywords, _OWN)
+    options = cull_options(options, keywords, visible)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
     if isinstance(depth, DepthImage):
