@@ -218,8 +218,17 @@ mod tests {
                 // Their edges cross the image.
                 let turn = std::f64::consts::TAU * random();
                 at = [at[0] + reach[0] * turn.cos(), at[1] + reach[1] * turn.sin()];
+                if k % 4 == 0 {
+                    // Their lowest points lie in a row of pixel centres, where rounding decides.
+                    at = [sides[0] / 2.0, f64::from(k % size.height) + 0.5 - reach[1]];
+                }
             }
             let reach = if k % 97 == 5 { [f64::INFINITY, 1e300] } else { reach };
+            let (at, reach) = if k % 97 == 6 {
+                ([at[0], f64::from(k % size.height) + 3.5], [f64::INFINITY, 3.0])
+            } else {
+                (at, reach)
+            };
             // Some depths are equal.
             let depth = if k % 3 == 0 { 0.25 } else { 0.1 + 0.8 * random() as f32 };
             some.push(Disc { at, reach, depth });
@@ -251,8 +260,16 @@ mod tests {
         image
     }
 
-    const CASES: [(u32, f64); 7] =
-        [(9, 1.5), (200, 2.0), (300, 12.0), (400, 80.0), (300, 1e5), (300, 1e8), (300, 1e13)];
+    const CASES: [(u32, f64); 8] = [
+        (9, 1.5),
+        (200, 2.0),
+        (300, 12.0),
+        (400, 80.0),
+        (300, 1e5),
+        (300, 1e8),
+        (300, 1e10),
+        (300, 1e14),
+    ];
 
     #[test]
     fn every_order_draws_the_nearest_of_all_that_cover_a_pixel() {
@@ -281,6 +298,21 @@ mod tests {
                     assert_eq!(image.pixels, right, "{width}x{height}, {count} nearest first");
                     let both = draw_discs(some.iter().copied(), size, convention);
                     assert_eq!(both, right, "{width}x{height}, {count} discs");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_disc_covers_of_a_row_lies_inside_of_it() {
+        let size = ImageSize::new(101, 23);
+        for (count, longest) in CASES {
+            for disc in discs(count, size, longest) {
+                let [columns, rows] = disc.spans(size);
+                for y in rows {
+                    let inside = inside_of_row(&disc, columns.clone(), y);
+                    let mut covered = columns.clone().filter(|x| disc.covers(*x, y));
+                    assert!(covered.all(|x| inside.contains(&x)), "{disc:?}, row {y}");
                 }
             }
         }
