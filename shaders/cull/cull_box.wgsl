@@ -16,6 +16,8 @@
 override TIER: u32;
 // The verdicts of groups are wanted, and the counts of what is tested.
 override VERDICTS: bool;
+// Which groups survive is wanted: the mask may begin full (`begin_mask.wgsl`).
+override FLIPS: bool;
 
 // Twin: `CULL_WORKGROUP` in `crates/hiz_core/src/instances/piece.rs`.
 const WORKGROUP: u32 = 128u;
@@ -33,7 +35,8 @@ struct Survivors {
     // Both are counted only where verdicts are wanted.
     tested: atomic<u32>,
     accepted: atomic<u32>,
-    padding: vec2<u32>,
+    is_full: u32,
+    padding: u32,
     // The arguments of the dispatch that accepts the members of groups, and how many groups.
     accept_workgroups: atomic<u32>,
     accept_workgroups_y: u32,
@@ -50,7 +53,8 @@ struct Survivors {
 
 // Writes a verdict that all groups of a box have.
 fn tell(box: u32, verdict: u32) {
-    if !VERDICTS {
+    // Where verdicts are not wanted, the words of groups that do not survive stay 0.
+    if !VERDICTS && (!FLIPS || verdict < VISIBLE) {
         return;
     }
     // The boxes of a survivor of an upper tier get verdicts of their own.
