@@ -516,6 +516,5 @@ def cull_request(
     if outputs is None:
         outputs = _OUTPUTS
     made = outputs if isinstance(outputs, Outputs) else _outputs_of(outputs)
-    return cull_options(options, of_options, of), _replaced(
-        made, of_outputs
-    ) if of_outputs else made
+    chosen = cull_options(options, of_options, of)
+    return chosen, _replaced(made, of_outputs) if of_outputs else made
