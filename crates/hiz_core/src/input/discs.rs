@@ -224,6 +224,7 @@ mod tests {
                 }
             }
             let reach = if k % 97 == 5 { [f64::INFINITY, 1e300] } else { reach };
+            // Some without an end to their sides have their uppermost point in such a row.
             let (at, reach) = if k % 97 == 6 {
                 ([at[0], f64::from(k % size.height) + 3.5], [f64::INFINITY, 3.0])
             } else {
