@@ -122,20 +122,26 @@ pub(super) struct Sides {
 }
 
 impl Sides {
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(corners: &[[i32; 2]; 3], point: [i32; 2]) -> Self {
-        let c = corners.map(|c| [0, 1].map(|k| i64::from(c[k]) - i64::from(point[k])));
+        let [x, y] = point.map(i64::from);
+        let [a, b, c] = corners;
+        let x = [i64::from(a[0]) - x, i64::from(b[0]) - x, i64::from(c[0]) - x];
+        let y = [i64::from(a[1]) - y, i64::from(b[1]) - y, i64::from(c[1]) - y];
         // Twice the areas of the point and a side.
-        let beside = |a: [i64; 2], b: [i64; 2]| a[0] * b[1] - a[1] * b[0];
-        let areas = [beside(c[0], c[1]), beside(c[1], c[2]), beside(c[2], c[0])];
-        let sense = if areas[0] + areas[1] + areas[2] < 0 { -1_i64 } else { 1 };
-        let (mut value, mut right, mut down) = ([0; 3], [0; 3], [0; 3]);
+        let mut value = [0; 3];
         for k in 0..3 {
-            let (a, b) = (c[k], c[(k + 1) % 3]);
-            right[k] = sense * (a[1] - b[1]);
-            down[k] = sense * (b[0] - a[0]);
+            let next = (k + 1) % 3;
+            value[k] = x[k] * y[next] - y[k] * x[next];
+        }
+        let sense = if value[0] + value[1] + value[2] < 0 { -1_i64 } else { 1 };
+        let (mut right, mut down) = ([0; 3], [0; 3]);
+        for k in 0..3 {
+            let next = (k + 1) % 3;
+            right[k] = sense * (y[k] - y[next]);
+            down[k] = sense * (x[next] - x[k]);
             let bias = i64::from(!(right[k] > 0 || (right[k] == 0 && down[k] > 0)));
-            value[k] = sense * areas[k] - bias;
+            value[k] = sense * value[k] - bias;
         }
         Self { value, right, down, sense: sense as i32 }
     }
@@ -153,11 +159,18 @@ impl Sides {
     #[inline]
     pub(super) fn windings(&self, units: i32) -> [i32; 4] {
         let units = i64::from(units);
-        let (right, down) = (self.right.map(|v| units * v), self.down.map(|v| units * v));
-        QUARTERS.map(|[x, y]| {
-            let at = |k: usize| self.value[k] + i64::from(x) * right[k] + i64::from(y) * down[k];
-            if (at(0) | at(1) | at(2)) >= 0 { self.sense } else { 0 }
-        })
+        let mut outside = [0; 4];
+        for k in 0..3 {
+            let (value, right, down) = (self.value[k], units * self.right[k], units * self.down[k]);
+            for (outside, [x, y]) in outside.iter_mut().zip(QUARTERS) {
+                *outside |= value + i64::from(x) * right + i64::from(y) * down;
+            }
+        }
+        let mut windings = [0; 4];
+        for (winding, outside) in windings.iter_mut().zip(outside) {
+            *winding = if outside >= 0 { self.sense } else { 0 };
+        }
+        windings
     }
 }
 
@@ -208,6 +221,66 @@ pub(super) fn for_each_centre(
                 now[k] += right[k];
             }
             x += 1;
+        }
+        for k in 0..3 {
+            value[k] += down[k];
+        }
+    }
+}
+
+/// Calls `inside` for runs of squares that a triangle covers as a whole, each grown by `reach`.
+///
+/// A run is its first and its last column, and its row.
+/// A square is covered if no side of the triangle meets it as in [`for_each_met`], and the triangle
+/// covers its centre.
+/// Without a `reach` the centre is all that counts.
+#[inline]
+pub(super) fn for_each_run_inside(
+    corners: [Corner; 3],
+    grid: Grid,
+    reach: Option<i32>,
+    mut inside: impl FnMut([i32; 2], i32),
+) {
+    let [p, q, r] = corners;
+    let (x, y) = (
+        [p.x.min(q.x).min(r.x), p.x.max(q.x).max(r.x)],
+        [p.y.min(q.y).min(r.y), p.y.max(q.y).max(r.y)],
+    );
+    let columns = grid.centres(x[0], x[1], grid.columns);
+    let rows = grid.centres(y[0], y[1], grid.rows);
+    // No less than its height and width: most triangles are smaller than a square.
+    let least = reach.map_or(0, |reach| grid.side() + 2 * reach);
+    let is_small = x[1] - x[0] < least || y[1] - y[0] < least;
+    if is_small || columns[0] > columns[1] || rows[0] > rows[1] {
+        return;
+    }
+    let mut functions = EdgeFunctions::new(corners);
+    if let Some(reach) = reach {
+        let half = i64::from(grid.side() / 2 + reach);
+        for k in 0..3 {
+            let [right, down] = [functions.right[k].abs(), functions.down[k].abs()];
+            functions.bias[k] = (right + down) * half + 1;
+        }
+    }
+    let EdgeFunctions { right, down, .. } = functions;
+    // As in `for_each_centre`.
+    let mut value =
+        functions.at(grid.centre(columns[0]), grid.centre(rows[0])).map(|v| v >> grid.log2);
+    for y in rows[0]..=rows[1] {
+        let (mut first, mut last) = (0, i64::from(columns[1] - columns[0]));
+        for k in 0..3 {
+            // The steps to the right after which the function is not negative.
+            let (value, step) = (value[k], right[k]);
+            match step.signum() {
+                1 if value < 0 => first = first.max((-value + step - 1) / step),
+                -1 if value >= 0 => last = last.min(value / -step),
+                0 | -1 if value < 0 => last = -1,
+                _ => {}
+            }
+        }
+        if first <= last {
+            // Both are within the columns.
+            inside([first, last].map(|steps| columns[0] + steps as i32), y);
         }
         for k in 0..3 {
             value[k] += down[k];
@@ -273,7 +346,7 @@ mod tests {
             ((state >> 16) % n).cast_signed()
         };
         let grid = Grid { log2: UNITS.ilog2(), columns: [0, 3], rows: [0, 3] };
-        let mut covered = [0; 2];
+        let (mut covered, mut whole) = ([0; 2], 0);
         for _ in 0..20_000 {
             // Many sides run through centres, which are odd multiples of 128.
             let corners = [0; 3].map(|_| [below(12) * 128 - 256, below(12) * 128 - 256]);
@@ -301,7 +374,23 @@ mod tests {
                     covered[usize::from(found)] += 1;
                 }
             }
+            // What no side meets and what is covered at its centre is covered as a whole.
+            let mut expected = found;
+            for side in [[a, b], [b, c], [c, a]] {
+                let all = |_, [first, last]: [i32; 2]| first..=last;
+                for_each_met(side, REACH, grid, all, |x, y| {
+                    expected[y as usize][x as usize] = false;
+                });
+            }
+            for (reach, expected) in [(Some(REACH), expected), (None, found)] {
+                let mut inside = [[false; 4]; 4];
+                for_each_run_inside([a, b, c], grid, reach, |[first, last], y| {
+                    (first..=last).for_each(|x| inside[y as usize][x as usize] = true);
+                });
+                assert_eq!(inside, expected, "{corners:?} {reach:?}");
+                whole += inside.as_flattened().iter().filter(|inside| **inside).count();
+            }
         }
-        assert!(covered[1] > 10_000, "{covered:?}");
+        assert!(covered[1] > 10_000 && whole > covered[1], "{covered:?} {whole}");
     }
 }

@@ -3,10 +3,11 @@
 use crate::host::threads::{cores, on_threads};
 use crate::input::camera::Camera;
 use crate::occluders::surface::cells::Cells;
-use crate::occluders::surface::facets::Rounder;
+use crate::occluders::surface::facets::{Facet, Rounder};
 use crate::occluders::surface::links::Standing;
 use crate::occluders::surface::looks::{Looks, Placed, Sought, Tiles, Wanted};
 use crate::occluders::surface::open_pixels::OpenPixels;
+use crate::occluders::surface::planted_fault::Planted;
 use crate::occluders::surface::proof::{band_rows, bands, proved};
 use crate::occluders::surface::search::search;
 use crate::occluders::surface::sheets;
@@ -20,20 +21,21 @@ pub(super) fn searched(
     rounder: &Rounder,
     camera: &Camera,
     refinement: u32,
-) -> Vec<f64> {
+) -> Vec<f32> {
     let size = camera.size();
-    let looks = Looks::new(
-        &placed,
-        camera,
-        rounder,
-        &Sought { tiles: &Tiles::open(size), open: None, known: None },
-    );
+    let looks =
+        Looks::new(&placed, camera, rounder, &Sought { tiles: &Tiles::open(size), open: None });
     let open = OpenPixels::new(size, vec![true; size.pixels() as usize]);
     let beyond = if camera.convention().is_reversed() { 0.0 } else { 1.0 };
     let mut far = vec![beyond; size.pixels() as usize];
     let search = Search { placed, links, rounder, looks: &looks, refinement };
     search.lower(&open, &Tiles::open(size), &mut far);
-    far
+    rounded(&far, placed.fault)
+}
+
+/// Values of `far` as float32, rounded towards far.
+fn rounded(far: &[f64], fault: Planted) -> Vec<f32> {
+    far.iter().map(|far| Facet::rounded(*far, fault)).collect()
 }
 
 /// What is searched.
@@ -76,16 +78,15 @@ pub(super) fn image(
     camera: &Camera,
     refinement: u32,
     centres: &[f32],
-) -> Vec<f64> {
+) -> Vec<f32> {
     let (size, convention) = (camera.size(), camera.convention());
     let beyond: f32 = if convention.is_reversed() { 0.0 } else { 1.0 };
     let centres = Centres { depths: centres, size, convention };
-    let (slabs, tried) = centres.slabs();
-    let looks =
-        Looks::new(&placed, camera, rounder, &Sought { tiles: &tried, open: None, known: None });
+    let (mut slabs, tried) = centres.slabs();
+    let mut looks = Looks::new(&placed, camera, rounder, &Sought { tiles: &tried, open: None });
     let has_uncertain = looks.has_uncertain;
     let walk = Walk { placed, rounder, looks: &looks, links };
-    let mut far = proved(&walk, &slabs, &tried, size);
+    let mut far = proved(&walk, &mut slabs, &tried, size);
     let is_open = |(far, slabs): (&f32, &Slabs)| *far == f32::INFINITY && *slabs != Slabs::NONE;
     let open = OpenPixels::new(size, far.iter().zip(&slabs).map(is_open).collect());
     if !open.is_empty() {
@@ -94,24 +95,20 @@ pub(super) fn image(
         let bounds: Vec<[f32; 2]> = pixels.iter().map(bound).collect();
         let last = pixels.iter().zip(&bounds).map(|(pixel, bounds)| (*pixel, bounds[1]));
         let tiles = Tiles::of(last, size);
-        let sought = Sought { tiles: &tiles, open: Some(&open), known: Some(&looks) };
-        let looks = Looks::new(&placed, camera, rounder, &sought);
-        let walk = Walk { looks: &looks, ..walk };
+        looks.add(&placed, camera, rounder, &Sought { tiles: &tiles, open: Some(&open) });
+        let walk = Walk { placed, rounder, looks: &looks, links };
         search(&walk, &open, &bounds, beyond, refinement, &mut far);
     }
-    let mut far: Vec<f64> = far.into_iter().map(|far| f64::from(far.min(beyond))).collect();
     if has_uncertain {
         // What is too uncertain for integers is missing everywhere so far.
-        let beyond = f64::from(beyond);
-        let open = OpenPixels::new(size, far.iter().map(|far| *far >= beyond).collect());
+        let mut all: Vec<f64> = far.iter().map(|far| f64::from(far.min(beyond))).collect();
+        let is_open = |far: &f64| *far >= f64::from(beyond);
+        let open = OpenPixels::new(size, all.iter().map(is_open).collect());
         let tiles = Tiles::open(size);
-        let looks = &Looks::new(
-            &placed,
-            camera,
-            rounder,
-            &Sought { tiles: &tiles, open: None, known: None },
-        );
-        Search { placed, links, rounder, looks, refinement }.lower(&open, &tiles, &mut far);
+        let sought = Sought { tiles: &tiles, open: None };
+        let looks = &Looks::new(&placed, camera, rounder, &sought);
+        Search { placed, links, rounder, looks, refinement }.lower(&open, &tiles, &mut all);
+        far = rounded(&all, placed.fault);
     }
     far
 }

@@ -90,8 +90,6 @@ pub(super) struct Sought<'a> {
     pub(super) tiles: &'a Tiles,
     /// Only what may meet one of these pixels is, if there are any.
     pub(super) open: Option<&'a OpenPixels>,
-    /// Whose vertices are not rounded again.
-    pub(super) known: Option<&'a Looks>,
 }
 
 impl Sought<'_> {
@@ -204,29 +202,66 @@ impl Looks {
         rounder: &Rounder,
         sought: &Sought<'_>,
     ) -> Self {
+        let mut looks = Self {
+            all: Vec::new(),
+            of_copy: Vec::new(),
+            by_meshlet: Vec::new(),
+            first_facet: vec![0],
+            has_uncertain: false,
+        };
+        for placement in placed.placements {
+            let meshlets = &placed.shapes.meshes[placement.mesh as usize].meshlets;
+            let before = looks.by_meshlet.len();
+            looks.of_copy.push((before as u32).wrapping_sub(meshlets.start));
+            looks.by_meshlet.resize(before + meshlets.len(), NO_LOOK);
+        }
+        looks.add(placed, camera, rounder, sought);
+        looks
+    }
+
+    /// Looks at what is sought besides.
+    ///
+    /// What is there stays, and so do the numbers of the facets.
+    pub(super) fn add(
+        &mut self,
+        placed: &Placed<'_>,
+        camera: &Camera,
+        rounder: &Rounder,
+        sought: &Sought<'_>,
+    ) {
         let size = camera.size();
-        let (mut all, mut of_copy) = (Vec::new(), Vec::new());
-        let (mut by_meshlet, mut first_facet) = (Vec::new(), vec![0]);
+        let mut is_asked = vec![false; self.all.len()];
+        let mut slots = self.by_meshlet.iter_mut();
         for (copy, placement) in (0..).zip(placed.placements) {
             let lens = Lens::new(&rounder.projector, placement, size);
             let meshlets = &placed.shapes.meshes[placement.mesh as usize].meshlets;
-            of_copy.push((by_meshlet.len() as u32).wrapping_sub(meshlets.start));
-            for meshlet in meshlets.clone() {
+            for (meshlet, slot) in meshlets.clone().zip(&mut slots) {
                 let it = &placed.shapes.meshlets[meshlet as usize];
-                let is_seen = lens.sees(it.min, it.max, sought);
-                by_meshlet.push(if is_seen { all.len() as u32 } else { NO_LOOK });
-                if is_seen {
-                    first_facet.push(first_facet[all.len()] + it.triangles.len() as u32);
-                    all.push(Look::new(copy, meshlet));
+                if !lens.sees(it.min, it.max, sought) {
+                    continue;
+                }
+                if *slot == NO_LOOK {
+                    let count = self.all.len();
+                    *slot = count as u32;
+                    self.first_facet.push(self.first_facet[count] + it.triangles.len() as u32);
+                    self.all.push(Look::new(copy, meshlet));
+                    is_asked.push(true);
+                } else {
+                    is_asked[*slot as usize] = true;
                 }
             }
         }
-        on_threads(cores(), all.chunks_mut(PART), |part| {
-            part.iter_mut().for_each(|look| look.fill(placed, rounder, sought, size));
-        });
+        on_threads(
+            cores(),
+            self.all.chunks_mut(PART).zip(is_asked.chunks(PART)),
+            |(part, asked)| {
+                for (look, _) in part.iter_mut().zip(asked).filter(|(_, is_asked)| **is_asked) {
+                    look.fill(placed, rounder, sought, size);
+                }
+            },
+        );
         let is_uncertain = |vertex: &Vertex| matches!(vertex, Vertex::Uncertain);
-        let has_uncertain = all.iter().any(|look| look.vertices.iter().any(is_uncertain));
-        Self { all, of_copy, by_meshlet, first_facet, has_uncertain }
+        self.has_uncertain = self.all.iter().any(|look| look.vertices.iter().any(is_uncertain));
     }
 
     /// The place of a meshlet of a copy in the list of all, if it is looked at.
@@ -367,7 +402,7 @@ impl Look {
         self.rows[0] <= last && self.rows[1] >= first
     }
 
-    /// Rounds the vertices and makes the facets.
+    /// Rounds the vertices and makes the facets that are sought and not there.
     fn fill(
         &mut self,
         placed: &Placed<'_>,
@@ -380,11 +415,8 @@ impl Look {
         let world = |v: &u32| placement.world(placed.shapes.positions[*v as usize]);
         let vertices = placed.topology.vertices(self.meshlet);
         let mut points: Vec<Point> = Vec::new();
-        let known = sought.known.filter(|_| placed.culled == FaceCull::None);
-        let known = known.and_then(|looks| Some((looks, looks.find(self.copy, self.meshlet)?)));
-        if let Some((looks, look)) = known {
-            self.vertices.clone_from(&looks.all[look as usize].vertices);
-        } else {
+        if self.vertices.is_empty() || placed.culled != FaceCull::None {
+            self.vertices.clear();
             self.vertices.reserve_exact(vertices.len());
             for vertex in vertices.iter().map(world) {
                 let (vertex, point) = rounder.vertex(vertex);
@@ -396,11 +428,14 @@ impl Look {
         }
         let triangles = &placed.shapes.meshlets[self.meshlet as usize].triangles;
         let sides = placed.topology.sides(triangles);
-        self.facets.reserve_exact(sides.len());
+        self.facets.resize(sides.len(), Facet::NOTHING);
         let mut extent = Extent::NOTHING;
         for (t, (corners, sides)) in
             placed.topology.corners(triangles).iter().zip(sides).enumerate()
         {
+            if self.has(t as u8) {
+                continue;
+            }
             let [a, b, c] = *corners;
             let [a, b, c] = if placement.mirrored { [a, c, b] } else { [a, b, c] }.map(usize::from);
             let mut facet = Facet::NOTHING;
@@ -428,14 +463,28 @@ impl Look {
                     }
                 }
             }
-            self.there |= u128::from(facet.is_there()) << t;
-            self.facets.push(facet);
+            if facet.is_there() {
+                self.there |= 1 << t;
+                self.facets[t] = facet;
+            }
         }
         let Extent { x, y } = extent;
         if x[0] <= x[1] {
-            self.columns = pixels(x[0], x[1], size[0]);
-            self.rows = pixels(y[0], y[1], size[1]);
+            let (columns, rows) = (pixels(x[0], x[1], size[0]), pixels(y[0], y[1], size[1]));
+            self.columns = joined(self.columns, columns);
+            self.rows = joined(self.rows, rows);
         }
+    }
+}
+
+/// The least range around two, of which the first is after the last in one that is empty.
+fn joined(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
+    if a[0] > a[1] {
+        b
+    } else if b[0] > b[1] {
+        a
+    } else {
+        [a[0].min(b[0]), a[1].max(b[1])]
     }
 }
 

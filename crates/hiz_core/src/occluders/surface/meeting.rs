@@ -18,7 +18,7 @@ pub(super) struct Piece<'a> {
     /// Its first triangle; most have no other.
     corners: [[i32; 2]; 3],
     /// Whether there are more in `Meeting::more`.
-    has_more: bool,
+    pub(super) has_more: bool,
 }
 
 /// An edge that meets an open pixel, of one facet or two.
@@ -195,6 +195,11 @@ impl<'a> Meeting<'a> {
 }
 
 impl Visitor for Meeting<'_> {
+    #[inline]
+    fn wants(&self, ends: &[Corner; 2]) -> bool {
+        self.squares.any(ends)
+    }
+
     #[inline]
     fn cover(&mut self, met: Met<'_>, corners: [Corner; 3]) {
         let first = self.covers.len();

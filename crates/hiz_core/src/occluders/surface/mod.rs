@@ -51,6 +51,7 @@
 //!    `walk` hands out their triangles and edges.
 //! 4. `proof` decides in exact integers which G cover their pixels (`coverage`, `squares`,
 //!    `chains`).
+//!    Single triangles come first (`alone`), then sets for the pixels that are left (`pixel_bits`).
 //!    Nearly all pixels end here.
 //! 5. `search` decides the rest by the same integers, with G that are connected across shared edges
 //!    that meet P (`meeting`).
@@ -89,6 +90,7 @@
 //! Triangles without a certain projection are dropped; their neighbours' edges become borders.
 //! Beyond the far plane nothing is hidden: such depths become far.
 
+mod alone;
 mod cells;
 mod chains;
 mod coverage;
@@ -98,6 +100,7 @@ mod links;
 mod looks;
 mod meeting;
 mod open_pixels;
+mod pixel_bits;
 pub(crate) mod planted_fault;
 mod projector;
 mod proof;
@@ -113,7 +116,6 @@ use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
 use crate::host::memory;
-use crate::host::rounding::round_up;
 use crate::host::threads::{Locked, cores};
 use crate::input::bounds::Floats;
 use crate::input::camera::Camera;
@@ -126,7 +128,7 @@ use crate::occluders::shapes::Shapes;
 use crate::occluders::surface::facets::Rounder;
 use crate::occluders::surface::links::{Links, Standing};
 use crate::occluders::surface::looks::Placed;
-use crate::occluders::surface::planted_fault::{Planted, is_planted};
+use crate::occluders::surface::planted_fault::Planted;
 use crate::occluders::surface::projector::Projector;
 use crate::occluders::surface::topology::Topology;
 use crate::occluders::view::View;
@@ -422,7 +424,7 @@ impl OccluderSurface {
         &self,
         camera: &Camera,
         fault: Planted,
-        image: impl FnOnce(Placed<'_>, &Standing<'_>, &Rounder) -> Vec<f64>,
+        image: impl FnOnce(Placed<'_>, &Standing<'_>, &Rounder) -> Vec<f32>,
     ) -> Result<Vec<f32>> {
         let placements = self.placements();
         let shared = self.shared.get_or_init(|| {
@@ -443,13 +445,10 @@ impl OccluderSurface {
         let convention = camera.convention();
         // The value of `far` at the far plane; reversed Z counts its depths negative.
         let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
-        #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
-        let rounded =
-            if is_planted!(fault, RoundedToNearest) { |far| far as f32 } else { round_up };
-        let ndc = |far: f64| match (far < beyond, convention.is_reversed()) {
+        let ndc = |far: f32| match (far < beyond, convention.is_reversed()) {
             (false, _) => convention.far(),
-            (true, false) => rounded(far).min(1.0),
-            (true, true) => Some(-rounded(far)).filter(|d| *d >= LEAST_DEPTH).unwrap_or(0.0),
+            (true, false) => far,
+            (true, true) => Some(-far).filter(|d| *d >= LEAST_DEPTH).unwrap_or(0.0),
         };
         Ok(far.into_iter().map(ndc).collect())
     }

@@ -63,6 +63,8 @@ pub enum PlantedFault {
     FoldsCancel,
     /// There, an edge that misses a pixel misses it, however it was rounded.
     NoEdgeMargin,
+    /// There, a triangle that covers a pixel's centre covers the pixel.
+    CentreForSquare,
     /// There, edges to triangles that were left out are no borders.
     LeftOutNeighboursIgnored,
     /// There, the pass over edges decides what is in a slab with planes in float32.

@@ -1,5 +1,7 @@
 //! Proves for each pixel which of its slabs cover it: one pass over triangles, one over edges.
 //!
+//! Pixels that one triangle covers as a whole are decided before that, see `alone`.
+//!
 //! Slab k of pixel P holds the facets that reach no farther in P than its threshold, see `is_in`.
 //! Both passes decide that by the same function of the same stored numbers.
 //!
@@ -18,12 +20,14 @@
 
 use crate::host::threads::{cores, on_threads};
 use crate::input::image::ImageSize;
+use crate::occluders::surface::alone::Alone;
 use crate::occluders::surface::chains::{AtEdge, Mask, Steps, Tally};
 use crate::occluders::surface::coverage::area;
 use crate::occluders::surface::facets::{Corner, Facet, REACH};
 use crate::occluders::surface::looks::{TILE, Tiles};
+use crate::occluders::surface::pixel_bits::PixelBits;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
-use crate::occluders::surface::squares::{Place, Squares};
+use crate::occluders::surface::squares::{Place, Squares, grid};
 use crate::occluders::surface::thresholds::{SLABS, Slabs};
 use crate::occluders::surface::walk::{Met, Visitor, Walk};
 
@@ -31,16 +35,32 @@ use crate::occluders::surface::walk::{Met, Visitor, Walk};
 /// value of `far` or before.
 ///
 /// Infinity where that cannot be shown.
-pub(super) fn proved(walk: &Walk<'_>, slabs: &[Slabs], tiles: &Tiles, size: ImageSize) -> Vec<f32> {
+///
+/// Leaves the slabs of the pixels that are covered by one triangle empty.
+pub(super) fn proved(
+    walk: &Walk<'_>,
+    slabs: &mut [Slabs],
+    tiles: &Tiles,
+    size: ImageSize,
+) -> Vec<f32> {
     let mut depths = vec![f32::INFINITY; slabs.len()];
     let part = (band_rows(size) * size.width) as usize;
-    let bands = depths.chunks_mut(part).zip(slabs.chunks(part)).zip(bands(size));
+    let bands = depths.chunks_mut(part).zip(slabs.chunks_mut(part)).zip(bands(size));
     on_threads(cores(), bands, |((depths, slabs), rows)| {
-        let mut band = Band::new(Squares::all(size.width, rows, tiles), slabs, walk.placed.fault);
-        walk.visit(|look| look.is_in_rows(rows), &mut band);
-        for (depth, state) in depths.iter_mut().zip(&band.states) {
-            *depth = state.depth();
+        let grid = grid(size.width, rows);
+        let mut alone = Alone { grid, tiles, slabs, depths, fault: walk.placed.fault };
+        for look in walk.looks.all.iter().filter(|look| look.is_in_rows(rows)) {
+            look.for_each_triangle(&walk.placed, |_, facet, corners| alone.cover(facet, corners));
         }
+        for (slabs, depth) in slabs.iter_mut().zip(&*depths) {
+            if *depth < f32::INFINITY {
+                *slabs = Slabs::NONE;
+            }
+        }
+        let left = PixelBits::new(size.width, rows[0], slabs, |slabs| *slabs != Slabs::NONE);
+        let mut band = Band::new(Squares::left(grid, &left, tiles), slabs, walk.placed.fault);
+        walk.visit(|look| left.any(look.columns, look.rows), &mut band);
+        left.for_each(|number| depths[number] = band.states[number].depth());
     });
     depths
 }
@@ -111,6 +131,11 @@ impl<'a> Band<'a> {
 }
 
 impl Visitor for Band<'_> {
+    #[inline]
+    fn wants(&self, ends: &[Corner; 2]) -> bool {
+        self.squares.any(ends)
+    }
+
     /// Adds a triangle to the windings of the pixels whose centres it covers.
     #[inline]
     fn cover(&mut self, met: Met<'_>, corners: [Corner; 3]) {

@@ -136,7 +136,7 @@ impl Sums {
 #[derive(Debug, Default)]
 struct Level {
     /// What may meet the square: pieces, and how they wind about the centres of four of these
-    /// squares.
+    /// squares; for a pixel about its own centre.
     pieces: Vec<(u32, [i32; 4])>,
     edges: Vec<u32>,
     members: Vec<Member>,
@@ -158,8 +158,6 @@ struct Search<'a> {
     places: Vec<u32>,
     stamps: Vec<u32>,
     stamp: u32,
-    /// By piece of the pixel: how it winds about the centres of the pixel's quarters.
-    quarters: Vec<[i32; 4]>,
 }
 
 impl<'a> Search<'a> {
@@ -174,16 +172,17 @@ impl<'a> Search<'a> {
             places: vec![0; count],
             stamps: vec![0; count],
             stamp: 0,
-            quarters: vec![[0; 4]; count],
         }
     }
 
     /// Takes the pieces that cover a pixel's centre, and the edges that meet the pixel.
     ///
-    /// Returns whether something covers the centres of all quarters.
+    /// Returns whether anything covers the centre.
     /// A sheet that covers the pixel has to.
     fn begin(&mut self, centre: [i32; 2], covers: &[u32], borders: &[u32]) -> bool {
-        let mut is_anything = [false; 4];
+        if covers.is_empty() {
+            return false;
+        }
         if self.levels.is_empty() {
             self.levels.push(Level::default());
         }
@@ -193,19 +192,21 @@ impl<'a> Search<'a> {
         level.edges.clear();
         level.edges.extend_from_slice(borders);
         let at_edges = borders.iter().flat_map(|e| self.meeting.edges[*e as usize].pieces);
-        for piece in covers.iter().copied().chain(at_edges).filter(|piece| *piece != NO_PIECE) {
+        let at_edges = at_edges.filter(|piece| *piece != NO_PIECE).map(|piece| (piece, 0));
+        for (piece, winding) in covers.iter().map(|piece| (*piece, 1)).chain(at_edges) {
             let stamp = &mut self.stamps[piece as usize];
             if *stamp != self.stamp {
                 *stamp = self.stamp;
-                let (winding, quarters) = self.meeting.windings(piece, centre, UNITS / 4);
+                // A triangle that is turned to the sense +1 winds once about what it covers.
+                let winding = if self.meeting.pieces[piece as usize].has_more {
+                    self.meeting.windings(piece, centre, 0).0
+                } else {
+                    winding
+                };
                 level.pieces.push((piece, [winding; 4]));
-                self.quarters[piece as usize] = quarters;
-                for (is_any, winding) in is_anything.iter_mut().zip(quarters) {
-                    *is_any |= winding != 0;
-                }
             }
         }
-        is_anything == [true; 4]
+        true
     }
 
     /// The value of `far` at or before which every ray through `square` is blocked.
@@ -265,7 +266,9 @@ impl<'a> Search<'a> {
             let edge = &self.meeting.edges[number as usize];
             let known = |piece: u32| piece != NO_PIECE && self.stamps[piece as usize] == self.stamp;
             let is_known = edge.pieces.map(known);
-            if is_known == [false; 2] || !square.is_met(edge.ends, self.reach) {
+            // It is known of all edges that they meet the pixel itself.
+            let is_met = || square.half == UNITS / 2 || square.is_met(edge.ends, self.reach);
+            if is_known == [false; 2] || !is_met() {
                 continue;
             }
             met.push(number);
@@ -282,9 +285,7 @@ impl<'a> Search<'a> {
             } else {
                 let member = &mut members[place(usize::from(is_known[1])) as usize];
                 member.is_met = true;
-                let is_left_out =
-                    [is_planted!(fault, ContoursIgnored), is_planted!(fault, BordersIgnored)];
-                member.own.is_open |= !is_left_out.contains(&true);
+                member.own.is_open |= !is_planted!(fault, ContoursIgnored);
             }
         }
     }
@@ -311,11 +312,7 @@ impl<'a> Search<'a> {
         let squares = square.quarters();
         let mut floors = [f32::INFINITY; 4];
         for member in level.members.iter().filter(is_hopeful) {
-            let windings = if depth == 0 {
-                self.quarters[member.piece as usize]
-            } else {
-                self.meeting.windings(member.piece, square.centre, square.half / 2).1
-            };
+            let windings = self.meeting.windings(member.piece, square.centre, square.half / 2).1;
             next.pieces.push((member.piece, windings));
             let facet = self.meeting.pieces[member.piece as usize].facet;
             for k in 0..4 {

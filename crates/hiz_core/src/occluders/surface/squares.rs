@@ -4,6 +4,7 @@ use crate::occluders::surface::coverage::{Grid, Sides, for_each_centre, for_each
 use crate::occluders::surface::facets::{Corner, Facet, REACH, UNITS};
 use crate::occluders::surface::looks::Tiles;
 use crate::occluders::surface::open_pixels::OpenPixels;
+use crate::occluders::surface::pixel_bits::PixelBits;
 
 /// One of the pixels.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +24,10 @@ pub(super) struct Squares<'a> {
 
 #[derive(Debug)]
 enum Kind<'a> {
-    All(&'a Tiles),
+    Left {
+        left: &'a PixelBits,
+        tiles: &'a Tiles,
+    },
     Open {
         open: &'a OpenPixels,
         /// The number of the first open pixel of these rows.
@@ -32,9 +36,9 @@ enum Kind<'a> {
 }
 
 impl<'a> Squares<'a> {
-    /// All pixels from the first to the last row.
-    pub(super) fn all(width: u32, rows: [i32; 2], tiles: &'a Tiles) -> Self {
-        Self { grid: grid(width, rows), kind: Kind::All(tiles) }
+    /// All pixels from the first to the last row, of which some are `left`.
+    pub(super) fn left(grid: Grid, left: &'a PixelBits, tiles: &'a Tiles) -> Self {
+        Self { grid, kind: Kind::Left { left, tiles } }
     }
 
     /// The open pixels from the first to the last row.
@@ -50,6 +54,21 @@ impl<'a> Squares<'a> {
     #[inline]
     fn place(&self, x: i32, y: i32, number: usize) -> Place {
         Place { centre: [self.grid.centre(x), self.grid.centre(y)], number }
+    }
+
+    /// Whether pixels in a box of units, grown by [`REACH`], are asked about at all.
+    #[inline]
+    pub(super) fn any(&self, corners: &[Corner]) -> bool {
+        let (mut x, mut y) = ([i32::MAX, i32::MIN], [i32::MAX, i32::MIN]);
+        for corner in corners {
+            x = [x[0].min(corner.x), x[1].max(corner.x)];
+            y = [y[0].min(corner.y), y[1].max(corner.y)];
+        }
+        let (columns, rows) = self.grid.around(x, y);
+        match self.kind {
+            Kind::Left { left, .. } => left.any(columns, rows),
+            Kind::Open { open, .. } => open.any(columns, rows),
+        }
     }
 
     /// The number of a pixel among all of these rows.
@@ -72,8 +91,12 @@ impl<'a> Squares<'a> {
         mut cover: impl FnMut(Place),
     ) {
         match self.kind {
-            Kind::All(tiles) => {
-                let is_hidden = |x, y| facet.nearest > f64::from(tiles.last(x, y));
+            Kind::Left { left, tiles } => {
+                if !self.any(&corners) {
+                    return;
+                }
+                let is_hidden =
+                    |x, y| !left.any_of_eight(x, y) || facet.nearest > f64::from(tiles.last(x, y));
                 for_each_centre(corners, self.grid, is_hidden, |x, y| {
                     let number = self.number(x, y);
                     if is_wanted(number) {
@@ -109,7 +132,7 @@ impl<'a> Squares<'a> {
     #[inline]
     pub(super) fn for_each_met(&self, edge: [Corner; 2], reach: i32, mut meet: impl FnMut(Place)) {
         match self.kind {
-            Kind::All(_) => {
+            Kind::Left { .. } => {
                 let all = |_, [first, last]: [i32; 2]| first..=last;
                 for_each_met(edge, reach, self.grid, all, |x, y| {
                     meet(self.place(x, y, self.number(x, y)));
@@ -125,6 +148,7 @@ impl<'a> Squares<'a> {
     }
 }
 
-fn grid(width: u32, rows: [i32; 2]) -> Grid {
+/// All pixels of the rows from the first to the last one.
+pub(super) fn grid(width: u32, rows: [i32; 2]) -> Grid {
     Grid { log2: UNITS.ilog2(), columns: [0, width.cast_signed() - 1], rows }
 }

@@ -71,8 +71,9 @@ impl Centres<'_> {
         let rows = TILE as usize * width;
         let parts = slabs.chunks_mut(rows).zip(tiles.lines_mut());
         on_threads(cores(), parts.zip((0..).step_by(TILE as usize)), |((part, tiles), first)| {
+            let mut around = Around::default();
             for (slabs, y) in part.chunks_exact_mut(width).zip(first..) {
-                self.choose(y, slabs);
+                self.choose(y, slabs, &mut around);
                 for (slabs, tile) in slabs.chunks(TILE as usize).zip(tiles.iter_mut()) {
                     for last in slabs.iter().map(Slabs::last) {
                         *tile = if last > *tile { last } else { *tile };
@@ -131,21 +132,20 @@ impl Centres<'_> {
     }
 
     /// Chooses the slabs of a row of pixels, which have nothing so far.
-    fn choose(&self, y: usize, slabs: &mut [Slabs]) {
-        let lines = self.lines(y);
-        for (x, slabs) in slabs.iter_mut().enumerate() {
-            let centre = self.near(lines[1][x]);
-            if centre <= 0.0 {
+    fn choose(&self, y: usize, slabs: &mut [Slabs], around: &mut Around) {
+        around.fill(self.lines(y).map(|line| line.iter().map(|depth| self.near(*depth))));
+        let farthest = |near: f32| if near > 0.0 { self.far(near) } else { f32::NEG_INFINITY };
+        let Around { lines, least, most, slopes, .. } = &*around;
+        let columns = lines[1][1..].iter().zip(least).zip(most).zip(slopes).enumerate();
+        for (slabs, (x, (((centre, least), most), slopes))) in slabs.iter_mut().zip(columns) {
+            if *centre <= 0.0 {
                 continue;
             }
-            let mut nine = self.nine(lines, x);
-            let slope = |a: f32, b: f32| {
-                let (a, b) = ((a - centre).abs(), (b - centre).abs());
-                if a < b { a } else { b }
+            let cluster = if *least >= STEP * most {
+                Cluster { first: f32::INFINITY, end: *least }
+            } else {
+                Cluster::of(&around.nine(x), *centre, *most)
             };
-            let slopes = slope(nine[3], nine[5]) + slope(nine[1], nine[7]);
-            let cluster = Cluster::new(&mut nine, centre);
-            let farthest = |near: f32| if near > 0.0 { self.far(near) } else { f32::NEG_INFINITY };
             let room = (cluster.end - BEYOND * (centre - cluster.end)) * HAIR;
             slabs.farthest = [farthest((centre - SLOPE * slopes) * HAIR), farthest(room)];
             slabs.nearest = if cluster.first < f32::INFINITY {
@@ -157,6 +157,63 @@ impl Centres<'_> {
     }
 }
 
+/// What is around the pixels of a row, with more for nearer.
+///
+/// Each list is filled by a loop without branches, which becomes vectors.
+#[derive(Debug, Default)]
+struct Around {
+    /// The row above, the row and the row below, with one more pixel at each end.
+    lines: [Vec<f32>; 3],
+    /// The least and the greatest of a pixel and those above and below it.
+    columns: [Vec<f32>; 2],
+    /// By pixel: the least and the greatest of the nine.
+    least: Vec<f32>,
+    most: Vec<f32>,
+    /// By pixel: the steps to a neighbour in the row and to one in the column, the smaller ones.
+    slopes: Vec<f32>,
+}
+
+impl Around {
+    /// Fills all lists, for rows of how near pixels are.
+    fn fill(&mut self, rows: [impl Iterator<Item = f32>; 3]) {
+        for (line, row) in self.lines.iter_mut().zip(rows) {
+            line.clear();
+            line.push(0.0);
+            line.extend(row);
+            // At the image's border a column repeats.
+            line[0] = line[1];
+            line.push(line[line.len() - 1]);
+        }
+        let [above, row, below] = &self.lines;
+        let min = |a: f32, b: f32| if a < b { a } else { b };
+        let max = |a: f32, b: f32| if a > b { a } else { b };
+        for (columns, pick) in self.columns.iter_mut().zip([min, max]) {
+            columns.clear();
+            let three = above.iter().zip(row).zip(below);
+            columns.extend(three.map(|((a, b), c)| pick(pick(*a, *b), *c)));
+        }
+        let [least, most] = &self.columns;
+        self.least.clear();
+        self.least.extend(least.windows(3).map(|w| min(min(w[0], w[1]), w[2])));
+        self.most.clear();
+        self.most.extend(most.windows(3).map(|w| max(max(w[0], w[1]), w[2])));
+        let step = |a: f32, centre: f32, b: f32| min((a - centre).abs(), (b - centre).abs());
+        let columns = above[1..].iter().zip(&below[1..]);
+        self.slopes.clear();
+        self.slopes.extend(
+            row.windows(3)
+                .zip(columns)
+                .map(|(w, (above, below))| step(w[0], w[1], w[2]) + step(*above, w[1], *below)),
+        );
+    }
+
+    /// How near a pixel and its neighbours are.
+    #[inline]
+    fn nine(&self, x: usize) -> [f32; 9] {
+        std::array::from_fn(|k| self.lines[k / 3][x + k % 3])
+    }
+}
+
 /// Of nine depths with more for nearer: those of one surface.
 struct Cluster {
     /// The nearest, or infinity where nothing comes before it, and the farthest.
@@ -165,29 +222,57 @@ struct Cluster {
 }
 
 impl Cluster {
-    /// The cluster of one of the nine, `centre`; they are sorted.
-    fn new(nine: &mut [f32; 9], centre: f32) -> Self {
-        let (mut least, mut most) = (centre, centre);
-        for v in nine.iter() {
-            least = if *v < least { *v } else { least };
-            most = if *v > most { *v } else { most };
+    /// The cluster of one of the nine, `centre`; `most` is the greatest of them.
+    ///
+    /// What is not much farther than the end of the cluster goes on with it, and what is not much
+    /// nearer than its beginning comes before that.
+    fn of(nine: &[f32; 9], centre: f32, most: f32) -> Self {
+        let (mut first, mut end) = (centre, centre);
+        loop {
+            let (mut nearest, mut farthest) = (first, end);
+            for v in nine {
+                let (goes_on, comes_before) = (*v >= STEP * end, first >= STEP * *v);
+                farthest = if goes_on && *v < farthest { *v } else { farthest };
+                nearest = if comes_before && *v > nearest { *v } else { nearest };
+            }
+            if nearest == first && farthest == end {
+                break;
+            }
+            (first, end) = (nearest, farthest);
         }
-        if least >= STEP * most {
-            return Self { first: f32::INFINITY, end: least };
-        }
+        Self { first: if first < most { first } else { f32::INFINITY }, end }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By sorting, and looking for gaps.
+    fn sorted(mut nine: [f32; 9], centre: f32) -> (f32, f32) {
         nine.sort_unstable_by(|a, b| b.total_cmp(a));
-        let (mut first, mut end) = (f32::INFINITY, centre);
-        let mut start = f32::INFINITY;
-        for (i, v) in nine.iter().enumerate() {
-            if i > 0 && *v < STEP * nine[i - 1] {
-                start = *v;
-            }
-            if *v >= centre {
-                first = start;
-            } else if start >= centre {
-                end = *v;
-            }
+        let starts = (0..9).filter(|i| *i == 0 || nine[*i] < STEP * nine[*i - 1]);
+        let start = starts.filter(|i| nine[*i] >= centre).next_back().unwrap();
+        let end = (start + 1..9).find(|i| nine[*i] < STEP * nine[*i - 1]).unwrap_or(9);
+        (if start == 0 { f32::INFINITY } else { nine[start] }, nine[end - 1])
+    }
+
+    #[test]
+    fn clusters_are_what_no_gap_divides() {
+        let mut state = 1_u32;
+        let mut below = |n: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) % n
+        };
+        let mut inner = 0;
+        for _ in 0..20_000 {
+            let room = 1 + below(20);
+            let nine: [f32; 9] = std::array::from_fn(|_| STEP.powf(below(room) as f32 * 0.45));
+            let most = nine.iter().copied().fold(0.0, f32::max);
+            let Cluster { first, end } = Cluster::of(&nine, nine[4], most);
+            assert_eq!((first, end), sorted(nine, nine[4]), "{nine:?}");
+            inner += u32::from(first < f32::INFINITY);
         }
-        Self { first, end }
+        assert!(inner > 5_000, "{inner}");
     }
 }

@@ -37,6 +37,9 @@ impl Met<'_> {
 
 /// What is done with them.
 pub(super) trait Visitor {
+    /// Whether an edge with these ends is asked for.
+    fn wants(&self, ends: &[Corner; 2]) -> bool;
+
     /// A triangle of a facet: the whole, or a part of what is left of it.
     fn cover(&mut self, met: Met<'_>, corners: [Corner; 3]);
 
@@ -82,6 +85,14 @@ impl<'a> Walk<'a> {
         around: &mut Vec<(Met<'a>, bool)>,
         visitor: &mut impl Visitor,
     ) {
+        let ends = match edge.ends.map(|v| &look.vertices[usize::from(v)]) {
+            [Vertex::Inside(a), Vertex::Inside(b)] => Some([*a, *b]),
+            _ => None,
+        };
+        // Most edges are dropped here, before it is known what meets there.
+        if ends.is_some_and(|ends| !visitor.wants(&ends)) {
+            return;
+        }
         let neighbours = self.placed.topology.neighbours(edge);
         let is_linked = has_links && self.links.number(look.copy, edge.id).is_some();
         let one = self.met(place, look, edge.triangle);
@@ -106,7 +117,7 @@ impl<'a> Walk<'a> {
             _ => return self.many(look, edge, one, around, visitor),
         };
         if (one.is_there() || other.is_there())
-            && let Some(ends) = self.ends(look, edge)
+            && let Some(ends) = ends.or_else(|| self.ends(look, edge))
         {
             visitor.border(ends, one, other, is_along);
         }
