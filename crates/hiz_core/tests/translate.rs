@@ -25,6 +25,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("FARTHEST", FLAG),
     ("FIRST", ONE_TO_THREE),
     ("FIT_VOLUME", FLAG),
+    ("FLIPS", FLAG),
     ("FOOTPRINT_LOG2", &[0.0, 1.0, 2.0, 3.0]),
     ("FROM_SOURCE", FLAG),
     ("INDEXED", FLAG),
@@ -32,6 +33,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("LEVELS", ONE_TO_THREE),
     ("LIST", FLAG),
     ("LOD_RULE", &[0.0, 1.0, 2.0, 3.0]),
+    ("LOOKS_AT_ACCEPTED", FLAG),
     ("MASK", FLAG),
     ("NEAREST", FLAG),
     ("ODD_X", FLAG),
@@ -51,9 +53,9 @@ const VALUES: &[(&str, &[f64])] = &[
     ("SORTED", FLAG),
     ("STATISTICS", FLAG),
     ("STEPS", ONE_TO_THREE),
-    ("TIER", &[0.0, 1.0, 2.0]),
     ("TALL", FLAG),
     ("TEXELS", ONE_TO_THREE),
+    ("TIER", &[0.0, 1.0, 2.0]),
     ("VERDICTS", FLAG),
 ];
 
