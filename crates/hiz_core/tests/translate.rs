@@ -17,6 +17,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("AMONG", FLAG),
     ("APPEND", FLAG),
     ("BY_INDEX", FLAG),
+    ("BY_ROWS", FLAG),
     ("CAPPED", FLAG),
     ("CHUNKS", ONE_TO_THREE),
     ("DESCENT", FLAG),
