@@ -6,8 +6,8 @@
 // The boxes that are not hidden are packed into a list, for the tests of what they hold:
 // `cull_children.wgsl` or `cull_members.wgsl`.
 //
-// Which groups can survive differs in the two passes of a frame: `groups_alone.wgsl`,
-// `groups_early.wgsl` and `groups_late.wgsl` have functions of the same names for it.
+// Which groups can survive differs in the early pass of a frame: `groups_alone.wgsl` and
+// `groups_early.wgsl` have functions of the same names for it.
 //
 // Source: Akenine-Moller, Haines and others, "Real-Time Rendering", section "Hierarchical
 // Z-Buffering".
@@ -132,9 +132,5 @@ fn cull_box(box: u32, is_accepted: bool) {
     tell(box, select(VISIBLE, outcome.verdict, outcome.verdict < VISIBLE || is_shown(outcome)));
     if is_candidate(outcome) {
         survive(box, is_shown(outcome));
-    } else {
-        for (var group = first_group(box); group < end_group(box); group += 1u) {
-            forget(group);
-        }
     }
 }

@@ -159,11 +159,10 @@ impl FramePass {
     /// The files that say which groups survive.
     fn group_files(self) -> &'static [File] {
         match self {
-            Self::Alone => &[wgsl!("cull/groups_alone")],
+            Self::Alone | Self::Late => &[wgsl!("cull/groups_alone")],
             Self::Early(_) => {
                 &[wgsl!("cull/history"), wgsl!("cull/candidates"), wgsl!("cull/groups_early")]
             }
-            Self::Late => &[wgsl!("cull/history"), wgsl!("cull/groups_late")],
         }
     }
 
@@ -179,9 +178,8 @@ impl FramePass {
     /// What a cull of groups writes, and what it reads of its frame.
     pub(super) fn group_bindings(self) -> &'static [(u32, Binding)] {
         match self {
-            Self::Alone => SURVIVOR_BINDINGS,
+            Self::Alone | Self::Late => SURVIVOR_BINDINGS,
             Self::Early(_) => EARLY_SURVIVOR_BINDINGS,
-            Self::Late => LATE_SURVIVOR_BINDINGS,
         }
     }
 
@@ -418,15 +416,6 @@ const EARLY_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
     (3, Binding::Write),
     (4, Binding::Read),
     (5, Binding::Uniform),
-];
-
-/// The bindings of a late pass's groups: as [`SURVIVOR_BINDINGS`], then the history.
-const LATE_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
-    (0, Binding::Write),
-    (1, Binding::Write),
-    (2, Binding::WriteTexels),
-    (3, Binding::Write),
-    (4, Binding::Write),
 ];
 
 /// The bindings of the survivors, which tests of what they hold read.

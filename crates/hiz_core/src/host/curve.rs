@@ -4,7 +4,7 @@
 //! IBM, 1966.
 
 /// Spreads the 21 lowest bits: each is followed by two zeros.
-#[inline]
+#[inline(always)]
 pub(crate) fn spread(v: u64) -> u64 {
     let v = (v | v << 32) & 0x001F_0000_0000_FFFF;
     let v = (v | v << 16) & 0x001F_0000_FF00_00FF;

@@ -1,11 +1,14 @@
-//! Vector algebra, the Morton curve, rounding, memory and threads on the host.
+//! Vector algebra, the Morton curve, rounding, memory, threads and wide vectors on the host.
 //!
-//! This room knows numbers and the standard library alone: no camera, no instance, no device.
+//! This room knows numbers alone: no camera, no instance, no device.
 //! Every other room may use it.
 
 pub(crate) mod curve;
 pub(crate) mod inverse;
 pub(crate) mod linear;
 pub(crate) mod memory;
+#[cfg(test)]
+pub(crate) mod random;
 pub(crate) mod rounding;
 pub(crate) mod threads;
+pub(crate) mod vectors;

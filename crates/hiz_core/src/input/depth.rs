@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 use crate::host::memory;
 use crate::host::rounding::ROUNDING;
 use crate::host::threads::{cores, on_threads};
+use crate::host::vectors;
 use crate::input::camera::Camera;
 use crate::input::depth_kind::DepthKind;
 use crate::input::depth_numbers::{DepthNumbers, of_half};
@@ -337,9 +338,14 @@ impl<'a> Conversion<'a> {
 
     fn note_far(&self, depths: &[f32]) {
         let far = self.convention.far();
-        if !self.has_far.load(Ordering::Relaxed)
-            && depths.iter().fold(false, |f, d| f | (*d == far))
-        {
+        if self.has_far.load(Ordering::Relaxed) {
+            return;
+        }
+        let has_far = vectors::widest(
+            #[inline(always)]
+            || depths.iter().fold(false, |f, d| f | (*d == far)),
+        );
+        if has_far {
             self.has_far.store(true, Ordering::Relaxed);
         }
     }
@@ -353,11 +359,13 @@ impl<'a> Conversion<'a> {
     /// Converts rows of 16 bits, which `read` turns into float32.
     fn widened(&self, first: u32, stored: &[u16], read: impl Fn(u16) -> f32, out: &mut [f32]) {
         let (width, invalid) = (self.size.width as usize, self.narrow_invalid());
-        let mut numbers = Vec::with_capacity(width);
+        let mut numbers = vec![0.0; width];
         let rows = stored.chunks_exact(width).zip(out.chunks_exact_mut(width));
         for (row, (stored, out)) in (first..).zip(rows) {
-            numbers.clear();
-            numbers.extend(stored.iter().map(|stored| read(*stored)));
+            vectors::widest(
+                #[inline(always)]
+                || numbers.iter_mut().zip(stored).for_each(|(number, v)| *number = read(*v)),
+            );
             self.convert(row, &numbers, &invalid, out);
         }
     }

@@ -86,7 +86,7 @@ impl DepthNumbers<'_> {
 /// Moved by 13 bits, its exponent and fraction are those of a float32 that is 2^-112 times as
 /// large, subnormals included.
 /// On the way there, only what is infinity or NaN overflows.
-#[inline]
+#[inline(always)]
 pub(super) fn of_half(bits: u16) -> f32 {
     const UP: f32 = f32::from_bits((127 + 112) << 23);
     const DOWN: f32 = f32::from_bits((127 - 112) << 23);

@@ -14,6 +14,7 @@ use std::ops::Range;
 
 use crate::host::linear::{Vec3, dot};
 use crate::host::rounding::ROUNDING;
+use crate::host::vectors;
 use crate::input::depth_kind::DepthKind;
 use crate::input::lens::{Lens, Rays};
 use crate::input::tolerance::DepthTolerance;
@@ -169,6 +170,22 @@ impl Quick {
         out: &mut [f32],
         exact: impl Fn(usize, T) -> f32,
     ) {
+        vectors::widest(
+            #[inline(always)]
+            || self.row_here(row, numbers, invalid, out, exact),
+        );
+    }
+
+    /// [`Quick::row`] in the vectors of the function that calls it.
+    #[inline(always)]
+    fn row_here<T: Number>(
+        &self,
+        row: u32,
+        numbers: &[T],
+        invalid: &[T],
+        out: &mut [f32],
+        exact: impl Fn(usize, T) -> f32,
+    ) {
         let y = (self.height - 2.0 * f64::from(row) - 1.0) / self.height;
         let segments = numbers.chunks(SEGMENT).zip(out.chunks_mut(SEGMENT));
         for (first, (numbers, out)) in (0..).step_by(SEGMENT).zip(segments) {
@@ -190,6 +207,7 @@ impl Quick {
     }
 
     /// The form's depth of a segment's numbers, rounded to float32 towards far.
+    #[inline(always)]
     fn depths<T: Number, const REVERSED: bool>(
         &self,
         first: usize,
@@ -244,6 +262,7 @@ impl Quick {
     }
 
     /// Makes far what is no depth, whatever the form makes of it.
+    #[inline(always)]
     fn refuse<T: Number>(&self, numbers: &[T], invalid: &[T], out: &mut [f32]) {
         let far = if self.reversed { 0.0 } else { 1.0 };
         if !self.knows_depth {
@@ -264,6 +283,7 @@ impl Quick {
 }
 
 /// The quotients of a segment in float32; `lost_in_single` bounds their errors.
+#[inline(always)]
 fn narrow_quotients<T: Number>(
     range: Range<usize>,
     y: f64,
@@ -302,6 +322,7 @@ fn rounded<const REVERSED: bool>(depth: f64) -> f32 {
 ///
 /// Floats from 0 on are ordered like their bits.
 /// The sign of a difference, spread over all bits, is a mask; compilers make no branches of it.
+#[inline(always)]
 fn clear_past_planes<const REVERSED: bool>(depths: &mut [f32], margin: f64) -> bool {
     let is_below = |a: i32, b: i32| a.wrapping_sub(b) >> 31;
     let one = 1.0_f32.to_bits().cast_signed();
@@ -502,6 +523,8 @@ fn toward_zero(v: f64) -> f64 {
 }
 
 #[cfg(test)]
+mod margins;
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::input::camera::Camera;
@@ -632,6 +655,56 @@ mod tests {
                             };
                             assert!(most <= few, "{convention:?} {far:?} {kind:?}: {most}");
                         }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Rows of every type and form, with numbers that are no depth.
+    #[test]
+    fn wider_vectors_give_the_same_bits() {
+        fn compare<T: Number>(quick: &Quick, numbers: &[T], invalid: &[T]) {
+            let exact = |column: usize, number: T| column as f32 + narrowed(number.into());
+            let mut out = [(); 2].map(|()| vec![0.0; numbers.len()]);
+            for row in [0, 1] {
+                quick.row(row, numbers, invalid, &mut out[0], exact);
+                quick.row_here(row, numbers, invalid, &mut out[1], exact);
+                let [wide, plain] = &out;
+                assert!(wide.iter().zip(plain).all(|(a, b)| a.to_bits() == b.to_bits()));
+            }
+        }
+        let mut wide: Vec<f64> = (0..2000).map(|i| 0.02 * 1.0071_f64.powi(i)).collect();
+        for (i, special) in [0.0, -1.0, f64::INFINITY, f64::NEG_INFINITY, 1e-310, 1e39, -0.0, 5.0]
+            .iter()
+            .enumerate()
+        {
+            wide[37 * i + 11] = *special;
+        }
+        let narrow: Vec<f32> = wide.iter().map(|v| narrowed(*v)).collect();
+        for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
+            let parallel = Projection::Orthographic {
+                left: -3.0,
+                right: 2.0,
+                bottom: -1.0,
+                top: 1.0,
+                near: 0.1,
+                far: 900.0,
+                convention,
+            };
+            let pose =
+                Pose { eye: [3.0, -2.0, 1.0], target: [9.0, 5.0, -7.0], up: [0.1, 1.0, 0.0] };
+            let size = ImageSize::new(2000, 2);
+            let cameras = [None, Some(1000.0)].map(|far| camera(convention, far).with_size(size));
+            let parallel = Camera::look_at(&pose, &parallel, size);
+            for camera in cameras.into_iter().chain([parallel]) {
+                let lens = Lens::new(&camera.unwrap()).unwrap();
+                for kind in [DepthKind::Z, DepthKind::Distance] {
+                    for is_wide in [false, true] {
+                        let tolerance = DepthTolerance::SINGLE;
+                        let quick = Quick::new(&lens, kind, 1.0, tolerance, is_wide).unwrap();
+                        compare(&quick, &narrow, &[5.0]);
+                        compare(&quick, &wide, &[5.0]);
                     }
                 }
             }

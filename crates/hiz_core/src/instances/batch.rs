@@ -9,6 +9,7 @@
 
 use wgpu::WriteOnly;
 
+use crate::host::vectors;
 use crate::input::bounds::{Bounds, BoundsKind, Floats};
 use crate::instances::aabb::Aabb;
 use crate::instances::narrow::{Fetched, are_all, around_spheres, round_up_from_0};
@@ -102,13 +103,20 @@ impl Batch {
         }
         let from = &from[..count];
         let record_bytes = kind.record_bytes() as usize;
-        if absent == 0
-            && boxes != Boxes::Each
-            && kind != BoundsKind::WidePoint
-            && narrow.pack(bounds, from, indices, &mut records[..count * record_bytes])
-        {
-            if boxes == Boxes::Whole {
-                tell(Around::All(narrow.around(bounds, count)));
+        let may_be_narrow = absent == 0 && boxes != Boxes::Each && kind != BoundsKind::WidePoint;
+        let around_narrow = may_be_narrow.then(|| {
+            let records = &mut records[..count * record_bytes];
+            vectors::widest(
+                #[inline(always)]
+                || {
+                    let is_packed = narrow.pack(bounds, from, indices, records);
+                    is_packed.then(|| (boxes == Boxes::Whole).then(|| narrow.around(bounds, count)))
+                },
+            )
+        });
+        if let Some(around) = around_narrow.flatten() {
+            if let Some(around) = around {
+                tell(Around::All(around));
             }
             let (mut here, rest) = target.split_at(count * record_bytes);
             here.copy_from_slice(&records[..count * record_bytes]);
@@ -130,23 +138,26 @@ impl Batch {
             }
             Bounds::Points { positions } => fetch::<3>(positions, from, first),
         }
-        let are_plain = match bounds {
-            _ if absent != 0 => false,
-            Bounds::Boxes { .. } => plain_boxes(first, second, indices, count, records),
-            Bounds::Spheres { .. } => plain_spheres(first, ones, indices, count, records),
-            Bounds::OrientedBoxes { .. } => false,
-            Bounds::Points { .. } => plain_points(first, kind, indices, count, records),
-        };
-        let around_all = match bounds {
-            _ if !(are_plain && boxes == Boxes::Whole) => None,
-            Bounds::Boxes { .. } => Some(around_boxes(&first[..3 * count], &second[..3 * count])),
-            Bounds::Points { .. } => Some(around_boxes(&first[..3 * count], &first[..3 * count])),
-            Bounds::Spheres { .. } => {
-                let centers = first.as_chunks().0.iter().take(count).copied();
-                Some(around_spheres(centers.zip(ones.iter().copied())))
-            }
-            Bounds::OrientedBoxes { .. } => None,
-        };
+        let (are_plain, around_all) = vectors::widest(
+            #[inline(always)]
+            || {
+                let numbers = (&*first, &*second, &*ones);
+                let indices = &indices[..count];
+                let are_plain = absent == 0 && plain((bounds, kind), numbers, indices, records);
+                let (lows, highs) = (&first[..3 * count], &second[..3 * count]);
+                let around_all = match bounds {
+                    _ if !(are_plain && boxes == Boxes::Whole) => None,
+                    Bounds::Boxes { .. } => Some(around_boxes(lows, highs)),
+                    Bounds::Points { .. } => Some(around_boxes(lows, lows)),
+                    Bounds::Spheres { .. } => {
+                        let centers = lows.as_chunks().0.iter().copied();
+                        Some(around_spheres(centers.zip(ones.iter().copied())))
+                    }
+                    Bounds::OrientedBoxes { .. } => None,
+                };
+                (are_plain, around_all)
+            },
+        );
         let (first, second) = (Floats::F64(first), Floats::F64(second));
         let fetched = match bounds {
             Bounds::Spheres { .. } => Bounds::Spheres { centers: first, radii: Floats::F64(ones) },
@@ -183,7 +194,24 @@ impl Batch {
     }
 }
 
+/// Writes records number by number; returns false if they have to be written one after the other.
+#[inline(always)]
+fn plain(
+    (bounds, kind): (&Bounds<'_>, BoundsKind),
+    (first, second, ones): (&Threes, &Threes, &[f64; GROUP]),
+    indices: &[u32],
+    records: &mut [u8],
+) -> bool {
+    match bounds {
+        Bounds::Boxes { .. } => plain_boxes(first, second, indices, records),
+        Bounds::Spheres { .. } => plain_spheres(first, ones, indices, records),
+        Bounds::OrientedBoxes { .. } => false,
+        Bounds::Points { .. } => plain_points(first, kind, indices, records),
+    }
+}
+
 /// The box around boxes without NaN.
+#[inline(always)]
 fn around_boxes(min: &[f64], max: &[f64]) -> Aabb {
     let mut around = Aabb::EMPTY;
     for (min, max) in min.as_chunks::<3>().0.iter().zip(max.as_chunks::<3>().0) {
@@ -222,6 +250,7 @@ struct Halves {
 
 impl Halves {
     /// As `volume_record::Position` does it, without its care for what is not finite.
+    #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
     fn of(positions: &Threes) -> Self {
         // As `rounding::flushed`.
@@ -241,14 +270,17 @@ impl Halves {
     }
 
     /// Whether all positions are small enough for records; not so for NaN.
+    #[inline(always)]
     fn are_small(&self) -> bool {
         are_all(self.hi.iter().map(|v| v.abs() < LARGEST))
     }
 
+    #[inline(always)]
     fn hi(&self, k: usize) -> [f32; 3] {
         [self.hi[3 * k], self.hi[3 * k + 1], self.hi[3 * k + 2]]
     }
 
+    #[inline(always)]
     fn lo(&self, k: usize) -> [f32; 3] {
         [self.lo[3 * k], self.lo[3 * k + 1], self.lo[3 * k + 2]]
     }
@@ -271,13 +303,8 @@ fn difference_up(a: f64, b: f64) -> f64 {
 
 /// Writes the records of boxes if all are valid and no corner is beyond the limits.
 /// Returns false if one is not.
-fn plain_boxes(
-    min: &Threes,
-    max: &Threes,
-    indices: &[u32; GROUP],
-    count: usize,
-    records: &mut [u8],
-) -> bool {
+#[inline(always)]
+fn plain_boxes(min: &Threes, max: &Threes, indices: &[u32], records: &mut [u8]) -> bool {
     let within = f64::from(LARGEST) / 4.0;
     let ordered = are_all(min.iter().zip(max).map(|(min, max)| min <= max));
     let least = are_all(min.iter().map(|v| *v > -within));
@@ -299,9 +326,10 @@ fn plain_boxes(
         *reach = next_up_if(*reach + rest, *rest != 0.0);
     }
     let half_sizes = reach.map(round_up_from_0);
-    for (k, record) in records.chunks_exact_mut(size_of::<BoxRecord>()).take(count).enumerate() {
+    let records = records.chunks_exact_mut(size_of::<BoxRecord>());
+    for (k, (record, index)) in records.zip(indices).enumerate() {
         let half_size = [half_sizes[3 * k], half_sizes[3 * k + 1], half_sizes[3 * k + 2]];
-        let made = BoxRecord::of_parts(halves.hi(k), halves.lo(k), half_size, indices[k]);
+        let made = BoxRecord::of_parts(halves.hi(k), halves.lo(k), half_size, *index);
         record.copy_from_slice(bytemuck::bytes_of(&made));
     }
     true
@@ -309,11 +337,11 @@ fn plain_boxes(
 
 /// Writes the records of spheres if all are valid, and two float32 hold every centre.
 /// Returns false if one is not so.
+#[inline(always)]
 fn plain_spheres(
     centers: &Threes,
     radii: &[f64; GROUP],
-    indices: &[u32; GROUP],
-    count: usize,
+    indices: &[u32],
     records: &mut [u8],
 ) -> bool {
     let halves = Halves::of(centers);
@@ -323,8 +351,9 @@ fn plain_spheres(
         return false;
     }
     let radii = radii.map(round_up_from_0);
-    for (k, record) in records.chunks_exact_mut(size_of::<SphereRecord>()).take(count).enumerate() {
-        let made = SphereRecord::of_parts(halves.hi(k), radii[k], halves.lo(k), indices[k]);
+    let records = records.chunks_exact_mut(size_of::<SphereRecord>());
+    for (k, (record, index)) in records.zip(indices).enumerate() {
+        let made = SphereRecord::of_parts(halves.hi(k), radii[k], halves.lo(k), *index);
         record.copy_from_slice(bytemuck::bytes_of(&made));
     }
     true
@@ -332,26 +361,21 @@ fn plain_spheres(
 
 /// Writes the records of points if all are valid.
 /// Returns false if one is not.
-fn plain_points(
-    positions: &Threes,
-    kind: BoundsKind,
-    indices: &[u32; GROUP],
-    count: usize,
-    records: &mut [u8],
-) -> bool {
+#[inline(always)]
+fn plain_points(positions: &Threes, kind: BoundsKind, indices: &[u32], records: &mut [u8]) -> bool {
     let halves = Halves::of(positions);
     // A NaN shows in the rest alone.
     let are_numbers = are_all(halves.rest.iter().map(|rest| *rest < f64::INFINITY));
     if !(are_numbers && halves.are_small()) {
         return false;
     }
-    let records = records.chunks_exact_mut(kind.record_bytes() as usize).take(count);
-    for (k, record) in records.enumerate() {
+    let records = records.chunks_exact_mut(kind.record_bytes() as usize);
+    for (k, (record, index)) in records.zip(indices).enumerate() {
         if kind == BoundsKind::Point {
-            let made = PointRecord::of_parts(halves.hi(k), indices[k]);
+            let made = PointRecord::of_parts(halves.hi(k), *index);
             record.copy_from_slice(bytemuck::bytes_of(&made));
         } else {
-            let made = WidePointRecord::of_parts(halves.hi(k), halves.lo(k), indices[k]);
+            let made = WidePointRecord::of_parts(halves.hi(k), halves.lo(k), *index);
             record.copy_from_slice(bytemuck::bytes_of(&made));
         }
     }
@@ -361,43 +385,28 @@ fn plain_points(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::random::Random;
     use crate::host::rounding::sum_up_difference;
 
-    /// Marsaglia's xorshift.
-    struct Random(u64);
-
-    impl Random {
-        fn bits(&mut self) -> u64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            self.0
-        }
-
-        fn pick<T: Copy>(&mut self, of: &[T]) -> T {
-            of[(self.bits() % of.len() as u64) as usize]
-        }
-
-        /// Of any size, with few or all bits of the fraction, and of either sign.
-        fn number(&mut self) -> f64 {
-            let fraction = self.bits() >> self.pick(&[12, 12, 30, 45, 60]);
-            let size = 1.0 + fraction as f64 / 2.0_f64.powi(52);
-            let power = self.pick(&[0, 0, 0, 3, -3, 20, -20, -40, -126, -140, -149, -1000]);
-            let signed = if self.bits() & 1 == 0 { size } else { -size };
-            self.pick(&[signed * 2.0_f64.powi(power), signed, signed * 100.0, 0.0, -0.0])
-        }
+    /// Of any size, with few or all bits of the fraction, and of either sign.
+    fn number(random: &mut Random) -> f64 {
+        let fraction = random.bits() >> random.pick(&[12, 12, 30, 45, 60]);
+        let size = 1.0 + fraction as f64 / 2.0_f64.powi(52);
+        let power = random.pick(&[0, 0, 0, 3, -3, 20, -20, -40, -126, -140, -149, -1000]);
+        let signed = if random.bits() & 1 == 0 { size } else { -size };
+        random.pick(&[signed * 2.0_f64.powi(power), signed, signed * 100.0, 0.0, -0.0])
     }
 
     /// Batches with and without bad numbers: both ways give the same bytes.
     #[test]
     fn both_ways_give_the_same_bits() {
         let mut random = Random(9);
-        let (mut plain, mut others) = (0, 0);
+        let (mut vectors_took, mut others) = (0, 0);
         for trial in 0..4000 {
             let narrow = trial % 3 == 0;
             let count = random.pick(&[1, 2, 63, 64]);
             let mut number = || {
-                let v = random.number();
+                let v = number(&mut random);
                 if narrow { f64::from(v as f32) } else { v }
             };
             let mut min: Threes = std::array::from_fn(|_| number());
@@ -420,7 +429,7 @@ mod tests {
                 max[at] = bad;
                 radii[at % GROUP] = bad;
             }
-            let indices = std::array::from_fn(|k| 7 * k as u32);
+            let indices: [u32; GROUP] = std::array::from_fn(|k| 7 * k as u32);
             let boxes = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
             let spheres =
                 Bounds::Spheres { centers: Floats::F64(&min), radii: Floats::F64(&radii) };
@@ -428,17 +437,19 @@ mod tests {
             for bounds in [boxes, spheres, points] {
                 let kind = bounds.kind();
                 let bytes = kind.record_bytes() as usize;
-                let mut got = vec![0xff; GROUP * bytes];
-                let are_plain = match bounds {
-                    Bounds::Boxes { .. } => plain_boxes(&min, &max, &indices, count, &mut got),
-                    Bounds::Points { .. } => plain_points(&min, kind, &indices, count, &mut got),
-                    _ => plain_spheres(&min, &radii, &indices, count, &mut got),
-                };
+                let [mut got, mut wide] = [(); 2].map(|()| vec![0xff; GROUP * bytes]);
+                let (numbers, some) = ((&min, &max, &radii), &indices[..count]);
+                let are_plain = plain((&bounds, kind), numbers, some, &mut got);
+                let are_plain_wide = vectors::widest(
+                    #[inline(always)]
+                    || plain((&bounds, kind), numbers, some, &mut wide),
+                );
+                assert_eq!((are_plain, &got), (are_plain_wide, &wide), "{trial} {kind:?}");
                 if !are_plain {
                     others += 1;
                     continue;
                 }
-                plain += 1;
+                vectors_took += 1;
                 for (k, got) in got.chunks_exact(bytes).take(count).enumerate() {
                     let mut expected = vec![0; bytes];
                     let is_valid = bounds.write_record(k, indices[k], &mut expected);
@@ -448,7 +459,7 @@ mod tests {
                 assert!(got[count * bytes..].iter().all(|byte| *byte == 0xff), "past the end");
             }
         }
-        assert!(plain > 1000 && others > 1000, "{plain} {others}");
+        assert!(vectors_took > 1000 && others > 1000, "{vectors_took} {others}");
         assert_eq!(difference_up(1.0, 1e-30), sum_up_difference(1.0, 1e-30));
     }
 }

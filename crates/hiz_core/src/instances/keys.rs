@@ -10,6 +10,7 @@ use std::ops::Range;
 use crate::error::Result;
 use crate::host::curve::spread;
 use crate::host::memory;
+use crate::host::vectors;
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::narrow::are_all;
 
@@ -94,6 +95,15 @@ impl Cube {
 
     /// The keys of the instances from `first` on.
     pub(super) fn keys(&self, bounds: &Bounds<'_>, first: usize, keys: &mut [u64]) {
+        vectors::widest(
+            #[inline(always)]
+            || self.keys_here(bounds, first, keys),
+        );
+    }
+
+    /// [`Cube::keys`] in the vectors of the function that calls it.
+    #[inline(always)]
+    fn keys_here(&self, bounds: &Bounds<'_>, first: usize, keys: &mut [u64]) {
         let middle: Threes = std::array::from_fn(|i| self.center[i % 3]);
         let mut centers = [0.0; 3 * BLOCK];
         for (first, keys) in (first..).step_by(BLOCK).zip(keys.chunks_mut(BLOCK)) {
@@ -122,6 +132,7 @@ impl Cube {
     }
 
     /// `middle`: the cube's centre for each instance of the block.
+    #[inline(always)]
     fn keys_of_block(&self, middle: &Threes, centers: &Threes, keys: &mut [u64; BLOCK]) {
         let mut from_center = [0.0; 3 * BLOCK];
         for ((from, center), middle) in from_center.iter_mut().zip(centers).zip(middle) {
@@ -194,6 +205,7 @@ fn center_of(bounds: &Bounds<'_>, i: usize) -> Option<[f64; 3]> {
 
 /// [`center_of`] for a block of instances.
 /// Returns false if one of them may have invalid bounds, and for kinds that go one by one.
+#[inline(always)]
 fn centers_of_block(bounds: &Bounds<'_>, first: usize, centers: &mut Threes) -> bool {
     let (threes, ones) = (3 * first..3 * (first + BLOCK), first..first + BLOCK);
     match *bounds {
@@ -215,6 +227,7 @@ fn centers_of_block(bounds: &Bounds<'_>, first: usize, centers: &mut Threes) -> 
     }
 }
 
+#[inline(always)]
 fn middles<T: Copy + Into<f64>>(min: &[T], max: &[T], middles: &mut Threes) -> bool {
     for ((middle, min), max) in middles.iter_mut().zip(min).zip(max) {
         *middle = 0.5 * (*min).into() + 0.5 * (*max).into();
@@ -226,6 +239,7 @@ fn middles<T: Copy + Into<f64>>(min: &[T], max: &[T], middles: &mut Threes) -> b
 }
 
 /// Copies numbers; returns whether all are finite.
+#[inline(always)]
 fn copied(numbers: Floats<'_>, range: Range<usize>, to: &mut Threes) -> bool {
     match numbers {
         Floats::F32(numbers) => {
@@ -239,26 +253,15 @@ fn copied(numbers: Floats<'_>, range: Range<usize>, to: &mut Threes) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::random::Random;
 
-    /// Marsaglia's xorshift.
-    struct Random(u64);
-
-    impl Random {
-        fn bits(&mut self) -> u64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            self.0
-        }
-
-        fn number(&mut self, special: &[f64]) -> f64 {
-            let unit = (self.bits() >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-            match self.bits() % 2000 {
-                0 => special[(self.bits() % special.len() as u64) as usize],
-                // Outliers of every size.
-                1..20 => unit * 2.0_f64.powi((self.bits() % 80) as i32),
-                _ => unit,
-            }
+    fn number(random: &mut Random, special: &[f64]) -> f64 {
+        let unit = random.unit() - 0.5;
+        match random.bits() % 2000 {
+            0 => random.pick(special),
+            // Outliers of every size.
+            1..20 => unit * 2.0_f64.powi((random.bits() % 80) as i32),
+            _ => unit,
         }
     }
 
@@ -292,10 +295,12 @@ mod tests {
         let (mut in_blocks, mut invalid) = (0, 0);
         for trial in 0..40 {
             let few = if trial % 2 == 0 { &special[..] } else { &[0.25] };
-            let min: Vec<f64> = (0..3 * n).map(|_| random.number(few)).collect();
-            let max: Vec<f64> =
-                min.iter().map(|v| v + random.number(few).abs() * f64::from(trial % 3)).collect();
-            let radii: Vec<f64> = (0..n).map(|_| random.number(few).abs()).collect();
+            let min: Vec<f64> = (0..3 * n).map(|_| number(&mut random, few)).collect();
+            let max: Vec<f64> = min
+                .iter()
+                .map(|v| v + number(&mut random, few).abs() * f64::from(trial % 3))
+                .collect();
+            let radii: Vec<f64> = (0..n).map(|_| number(&mut random, few).abs()).collect();
             let narrow = |v: &[f64]| v.iter().map(|v| *v as f32).collect::<Vec<_>>();
             let (min_32, max_32, radii_32) = (narrow(&min), narrow(&max), narrow(&radii));
             let wide = |v| Floats::F64(v);

@@ -23,6 +23,7 @@ impl<const THREES: usize, const ONES: usize> Fetched<THREES, ONES> {
 
     /// Writes the records of the volumes `from`.
     /// Returns false if they have to be packed in another way.
+    #[inline(always)]
     pub(super) fn pack(
         &mut self,
         bounds: &Bounds<'_>,
@@ -65,6 +66,7 @@ impl<const THREES: usize, const ONES: usize> Fetched<THREES, ONES> {
     }
 
     /// The box around the volumes that were packed last.
+    #[inline(always)]
     pub(super) fn around(&self, bounds: &Bounds<'_>, count: usize) -> Aabb {
         let positions = self.positions.as_chunks::<3>().0.iter().take(count);
         let positions = positions.map(|position| position.map(f64::from));
@@ -76,6 +78,7 @@ impl<const THREES: usize, const ONES: usize> Fetched<THREES, ONES> {
 }
 
 /// Fetches `N` numbers of each of the instances `from`.
+#[inline(always)]
 fn fetch<'a, const N: usize>(numbers: &[f32], from: &[usize], to: &'a mut [f32]) -> &'a [f32] {
     for (to, i) in to.as_chunks_mut::<N>().0.iter_mut().zip(from) {
         to.copy_from_slice(&numbers[N * i..N * i + N]);
@@ -84,6 +87,7 @@ fn fetch<'a, const N: usize>(numbers: &[f32], from: &[usize], to: &'a mut [f32])
 }
 
 /// `all` without an early end, which would keep a compiler from making vectors.
+#[inline(always)]
 pub(super) fn are_all(each: impl Iterator<Item = bool>) -> bool {
     each.fold(0_u32, |wrong, is_so| wrong | u32::from(!is_so)) == 0
 }
@@ -98,6 +102,7 @@ pub(super) fn round_up_from_0(v: f64) -> f32 {
 
 /// Whether records hold all positions as they are.
 /// A device may flush subnormal numbers, so records do not have them.
+#[inline(always)]
 fn are_held(positions: &[f32]) -> bool {
     are_all(positions.iter().map(|v| {
         let size = v.abs();
@@ -109,6 +114,7 @@ fn are_held(positions: &[f32]) -> bool {
 ///
 /// Rounding outwards keeps the order of numbers.
 /// So it is done once, after the least and greatest of all were found.
+#[inline(always)]
 pub(super) fn around_spheres(spheres: impl Iterator<Item = ([f64; 3], f64)>) -> Aabb {
     // What has no size is not rounded.
     let (mut sized, mut points) = (Aabb::EMPTY, Aabb::EMPTY);
