@@ -5,6 +5,8 @@
 override SAMPLE_COVERAGE: bool;
 // True: descend to finer levels where the footprint cannot decide.
 override DESCENT: bool;
+// True: with both ends, a descent goes down row by row to find out that all of a volume shows.
+override BY_ROWS: bool;
 // True: compare each texel with the volume's own outline and front there.
 // Otherwise a texel is compared with the volume's rectangle at the volume's nearest depth.
 override FIT_VOLUME: bool;

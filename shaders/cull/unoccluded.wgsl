@@ -70,6 +70,52 @@ fn descend_in_front(
     return false;
 }
 
+// The same as `descend_in_front`, row by row, for the boxes of groups.
+//
+// What stands on the ground has nearer ground before it, at the lower border of its rectangle.
+// There all texels of a row fail alike, so the walk enters the whole row at the first that fails.
+// So it accepts more of such groups than `descend_in_front` does with as many texels.
+fn rows_in_front(
+    top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, z: Value, w: Value,
+    front: ptr<function, u32>, texels_read: ptr<function, u32>,
+) -> bool {
+    var left = view.descent_budget;
+    var level = top;
+    var at = t.xy;
+    var decided = far_bits();
+    loop {
+        if left == 0u {
+            return false;
+        }
+        left -= 1u;
+        *texels_read += 1u;
+        let bits = nearest_texel(level, at.x, at.y);
+        if surely_in_front(bits, z, w) {
+            decided = nearest(decided, bits);
+            at.x += 1u;
+            if at.x > last.x >> level {
+                at = vec2<u32>(first.x >> level, at.y + 1u);
+                if at.y > last.y >> level {
+                    *front = decided;
+                    return true;
+                }
+            }
+            continue;
+        }
+        // As in `descend_in_front`.
+        let begin = at << vec2<u32>(level);
+        let end = min((at + vec2<u32>(1u)) << vec2<u32>(level), vec2<u32>(view.size));
+        if level == 0u || (all(begin >= first) && all(end <= last + vec2<u32>(1u))) {
+            *front = bits;
+            return false;
+        }
+        let down = levels_down(level);
+        level -= down;
+        at = vec2<u32>(first.x >> level, max(at.y << down, first.y >> level));
+    }
+    return false;
+}
+
 // True implies: all of the volume lies within the six planes of the frustum, and w > 0 on it.
 // It also stays away from the image's borders by the guard.
 fn surely_inside(x: Value, y: Value, z: Value, w: Value) -> bool {

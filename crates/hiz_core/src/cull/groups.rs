@@ -50,7 +50,7 @@ pub(crate) fn group_options(options: &CullOptions) -> CullOptions {
 
 /// The key of the pipeline of a group's test.
 pub(super) fn group_key(key: CullKey) -> CullKey {
-    CullKey { kind: BoundsKind::Box, descent: true, ..key }
+    CullKey { kind: BoundsKind::Box, descent: true, by_rows: true, ..key }
 }
 
 /// How many tiers of boxes are culled before the instances of a piece: 0 for none, 1 for groups.

@@ -154,6 +154,7 @@ impl PreparedView {
             sample_coverage: options.coverage == Coverage::Sample,
             footprint_log2: options.footprint.log2(),
             descent: view.descent_budget > 0,
+            by_rows: false,
             fit_volume: options.fit == Fit::Volume,
             among: inputs.among.is_some(),
             nearest: pyramid.has_nearest(),

@@ -24,6 +24,8 @@ pub(crate) struct CullKey {
     pub(crate) sample_coverage: bool,
     pub(crate) footprint_log2: u32,
     pub(crate) descent: bool,
+    /// Whether a descent on the nearest end goes row by row, as it does for boxes of groups.
+    pub(crate) by_rows: bool,
     pub(crate) fit_volume: bool,
     /// Whether only some instances are asked for.
     pub(crate) among: bool,
@@ -90,6 +92,7 @@ impl CullKey {
             chunks: 1,
             footprint_log2: 1,
             descent: false,
+            by_rows: false,
             fit_volume: false,
             among: false,
             nearest: false,
@@ -291,13 +294,14 @@ pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::SampledQuads),
 ];
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 9] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 10] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
         ("SAMPLE_COVERAGE", flag(key.sample_coverage)),
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
+        ("BY_ROWS", flag(key.by_rows)),
         // A point's rectangle is all there is of it.
         ("FIT_VOLUME", flag(key.fit_volume && !key.kind.is_point())),
         ("AMONG", flag(key.among)),

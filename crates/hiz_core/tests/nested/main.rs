@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod masks;
+mod rows;
 
 use std::sync::Arc;
 

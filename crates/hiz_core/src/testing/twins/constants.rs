@@ -497,6 +497,7 @@ fn a_cull_sets_every_override() {
             chunks: 1,
             sample_coverage: false,
             footprint_log2: 1,
+            by_rows: false,
             descent: false,
             fit_volume: false,
             among: false,
