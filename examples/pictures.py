@@ -13,6 +13,10 @@ import numpy as np
 
 import hizvk
 
+if "--help" in sys.argv:
+    print(__doc__)
+    sys.exit()
+
 device = hizvk.Device()
 camera = hizvk.Camera.look_at((0, 1.7, 0), (0, 1.5, -1), fov_y_deg=60, size=(270, 480), near=0.1)
 quads = np.array(

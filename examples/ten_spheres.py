@@ -16,6 +16,10 @@ import numpy.typing as npt
 
 import hizvk
 
+if "--help" in sys.argv:
+    print(__doc__)
+    sys.exit()
+
 N, SIDE, SIZE = 10, 24, (180, 240)
 
 # A sphere of 24 meridians and 23 circles, and ten copies of it along the view.

@@ -13,18 +13,31 @@ MARK = "<!-- From here on"
 PLOT = "castle.png"
 
 
-def main(report: Path) -> None:
-    """Puts the report, without title, pictures and legend, in place of what is below the mark."""
-    lines = report.read_text(encoding="utf-8").splitlines()
+def renewed(page: str, report: str) -> str:
+    """The page with the report's tables below its mark; sections behind them stay.
+
+    The report's title, pictures and legend are left out.
+    """
+    lines = report.splitlines()
     first = next(k for k, line in enumerate(lines) if line.startswith("- Command"))
     last = lines.index("## What the columns mean")
     tables = [
         line.replace("## ", "### ", 1) for line in lines[first:last] if not line.startswith("![")
     ]
-    kept = DOCUMENT.read_text(encoding="utf-8").splitlines()
+    kept = page.splitlines()
     mark = next(k for k, line in enumerate(kept) if line.startswith(MARK))
-    text = "\n".join([*kept[: mark + 1], "", *tables]).replace("\n\n\n", "\n\n").rstrip()
-    DOCUMENT.write_text(text + "\n", encoding="utf-8")
+    behind = [k for k, line in enumerate(kept) if k > mark and line.startswith("## ")]
+    rest = kept[behind[0] :] if behind else []
+    text = "\n".join([*kept[: mark + 1], "", *tables, "", *rest])
+    while "\n\n\n" in text:
+        text = text.replace("\n\n\n", "\n\n")
+    return text.rstrip() + "\n"
+
+
+def main(report: Path) -> None:
+    """Renews the page, and the plot where the report has one."""
+    text = renewed(DOCUMENT.read_text(encoding="utf-8"), report.read_text(encoding="utf-8"))
+    DOCUMENT.write_text(text, encoding="utf-8")
     if (report.parent / PLOT).exists():
         shutil.copyfile(report.parent / PLOT, DOCUMENT.parent / "images" / "bench.png")
 

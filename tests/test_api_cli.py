@@ -4,16 +4,20 @@ import importlib.machinery
 import json
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import types
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import hizvk
 from hizvk import _core, cli, doctor
+from hizvk.commands import pipes
 
+ROOT = Path(__file__).parents[1]
 INSTALL_LINE = "apt install libvulkan1 mesa-vulkan-drivers"
 
 
@@ -88,6 +92,66 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     text = capsys.readouterr().out
     for command in ("info", "doctor", "demo", "bench"):
         assert command in text
+
+
+def with_a_closed_pipe(*command: str, unbuffered: str, streams: tuple[str, ...]) -> int:
+    """The exit code of a module; it has nothing to say on stderr, where that is open."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    others = {"stderr": subprocess.PIPE} | dict.fromkeys(streams, writer)
+    run = subprocess.run(
+        [sys.executable, "-m", *command],
+        cwd=ROOT,
+        text=True,
+        env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+        **others,  # type: ignore[call-overload]
+    )
+    os.close(writer)
+    assert not run.stderr
+    return int(run.returncode)
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("streams", [("stdout",), ("stdout", "stderr")])
+def test_a_closed_pipe_is_no_error(unbuffered: str, streams: tuple[str, ...]) -> None:
+    """As behind ``| head -1``; the exit code is that of a program which the signal ends."""
+    code = with_a_closed_pipe("hizvk", "info", "--json", unbuffered=unbuffered, streams=streams)
+    assert code == 128 + signal.SIGPIPE
+
+
+@pytest.mark.parametrize(
+    "module", ["hizvk.methods.turitzin", "hizvk.bench.sweeps", "tools.speed", "tools.jobs"]
+)
+def test_every_command_has_that_way_out(module: str) -> None:
+    code = with_a_closed_pipe(module, "--help", unbuffered="", streams=("stdout",))
+    assert code == 128 + signal.SIGPIPE
+
+
+def test_another_pipe_s_error_stays_one(capsys: pytest.CaptureFixture[str]) -> None:
+    def breaks() -> int:
+        raise BrokenPipeError("a worker's")
+
+    with pytest.raises(BrokenPipeError, match="a worker's"):
+        pipes.run(breaks)
+    assert pipes.run(lambda: None) == 0
+    assert pipes.run(lambda: 3) == 3
+
+
+@pytest.mark.parametrize("name", ["colour_points", "model_visibility", "pictures", "ten_spheres"])
+def test_examples_with_arguments_have_help(name: str, tmp_path: Path) -> None:
+    script = ROOT / "examples" / f"{name}.py"
+    assert "sys.argv" in script.read_text()
+    run = subprocess.run(
+        [sys.executable, script, "--help"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.startswith(script.read_text().partition("\n")[0].strip('"'))
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_example_with_arguments_is_listed() -> None:
+    takes = {path.stem for path in ROOT.glob("examples/*.py") if "sys.argv" in path.read_text()}
+    assert takes == {"colour_points", "model_visibility", "pictures", "ten_spheres"}
 
 
 WITHOUT_DRIVER = """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -106,6 +105,53 @@ def test_depth_in_millimetres_without_a_scale(device: hizvk.Device, dtype: Any) 
     assert not hizvk.visible(bounds, CAMERA, depth=depth, kind="z", scale=0.001).any()
 
 
+def before_and_behind(unit: float) -> tuple[hizvk.Spheres, npt.NDArray[Any]]:
+    """Balls of up to 30 % before and behind a wall that runs from 2 to 9 m, positions in `unit`."""
+    depth, rng = room(2.0, 9.0), np.random.default_rng(3)
+    places = rng.uniform(0.1, 0.9, (60, 2)) * SIZE
+    z = depth[tuple(places.astype(int).T)] * rng.uniform(0.7, 1.3, 60)
+    # By hand: 60 degrees over 48 rows, square pixels.
+    step = 2.0 * np.tan(np.radians(30.0)) / SIZE[0]
+    up, right = (SIZE[0] / 2 - places[:, 0]) * step, (places[:, 1] - SIZE[1] / 2) * step
+    return hizvk.Spheres(np.c_[right * z, up * z, -z] * unit, 0.02 * unit), depth
+
+
+def test_centimetres_and_metres(device: hizvk.Device) -> None:
+    """A factor of 100 may be right; balls that lie at the depth of their pixels without it tell."""
+    metres, depth = before_and_behind(1.0)
+    assert said(metres, depth) == []
+    seen = hizvk.visible(metres, CAMERA, depth=depth, kind="z")
+    assert 10 < seen.sum() < 50
+    cm, _ = before_and_behind(100.0)
+    hints = said(cm, depth)
+    assert hints[0].startswith("bounds, depth: all 60 in view are hidden, and most middles / 100")
+    assert "pass scale=100, or positions / 100" in hints[0]
+    (text,) = asked(device, cm, depth)
+    assert text.startswith("bounds, depth: all 60 in view are hidden, and most middles / 100")
+    hints += said(metres, 100.0 * depth)
+    assert hints[1].startswith("depth, scale: nothing is hidden")
+    assert "if it is in centimetres and positions are in metres, pass scale=0.01" in hints[1]
+    whole = (100.0 * depth).astype(np.uint16)
+    assert "pass scale=0.01" in said(metres, whole)[0]
+    assert len(hints) == 2
+    # With what the hints say, the answer is that of metres.
+    for bounds, image, scale in ((cm, depth, 100.0), (metres, 100.0 * depth, 0.01)):
+        found = hizvk.visible(bounds, CAMERA, depth=image, kind="z", scale=scale)
+        assert (found == seen).mean() > 0.95
+    # A factor of 100 alone is none: things behind a near wall, and before far mountains.
+    assert said(crowd(20.0, 380.0), room(2.0, 2.0)) == []
+    assert said(crowd(0.5, 15.0), room(400.0, 500.0)) == []
+
+
+def test_ndc_depth_has_no_scale() -> None:
+    """Near and far in other units than the positions: there is no scale to pass."""
+    depth = 0.1 / room(2000.0, 2100.0)
+    (text,) = said(crowd(2.0, 3.0), depth, kind="reversed_ndc")
+    assert text.startswith("depth, scale: nothing is hidden")
+    assert text.endswith("bring them to those")
+    assert "scale=" not in text
+
+
 def test_whole_numbers_that_are_world_units(device: hizvk.Device) -> None:
     """A scene in millimetres, as data sets of robots have it."""
     depth = room(900.0, 1100.0, np.uint16)
@@ -163,34 +209,7 @@ def test_parallel_rays_have_no_ratios(device: hizvk.Device) -> None:
     assert asked(device, inside, np.full(SIZE, 0.1), bare, kind="ndc") == ()
 
 
-# -- angles ----------------------------------------------------------------------------------------
-
-
-def made(angle: float, name: str = "look_at") -> hizvk.Camera:
-    if name == "look_at":
-        return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=angle, size=SIZE, near=0.1)
-    return hizvk.Camera.from_opengl(
-        **{name: angle}, near=0.1, size=SIZE, world_from_camera=np.eye(4)
-    )
-
-
-@pytest.mark.parametrize("name", ["look_at", "fov_x_deg", "fov_y_deg"])
-def test_an_angle_in_radians(name: str) -> None:
-    for degrees in (30, 45, 60, 75, 90, 120):
-        for angle in (math.radians(degrees), round(math.radians(degrees), 4)):
-            with pytest.warns(hizvk.HizWarning, match=f"if that is meant, pass {degrees}$") as told:
-                made(angle, name)
-            assert told[0].filename == __file__
-            assert str(told[0].message).startswith("fov_")
-
-
-def test_narrow_views_are_no_radians() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        for hundredths in range(1, 320):
-            made(hundredths / 100)
-        for degrees in (5, 45.5, 57.29577951308232, 90, 179):
-            made(degrees)
+# -- heights and points ----------------------------------------------------------------------------
 
 
 def test_heights_of_float32_s_end_are_refused() -> None:
@@ -200,9 +219,6 @@ def test_heights_of_float32_s_end_are_refused() -> None:
         hizvk.viewshed(heights, 10.0, (3, 3))
     way = str(caught.value).rpartition("pass ")[2]
     assert np.isnan(eval(way, {"heights": heights, "np": np})).sum() == 3
-
-
-# -- heights and points ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("number", [-9999.0, -32768.0])
@@ -243,25 +259,6 @@ def test_points_of_one_pixel_each_are_hinted_at() -> None:
         hizvk.depth_from_points(dense, CAMERA)
         hizvk.depth_from_points(hizvk.Points(points.positions[:9]), CAMERA)
         hizvk.depth_from_points(hizvk.Points(np.zeros((0, 3))), CAMERA)
-
-
-def test_angles_in_radians_for_boxes() -> None:
-    """Quarter and half turns of data sets, with two digits; few boxes turn by 1.57 degrees."""
-    centers = np.zeros((4, 3))
-    for yaws in ([1.57, -1.57, 3.14, 0.0], [1.58, -1.56, 0.0, 0.0], 1.5708):
-        with pytest.warns(hizvk.HizWarning, match=r"^yaw_deg: most of the .* np\.degrees") as seen:
-            hizvk.OrientedBoxes.from_yaw(centers, 1.0, yaws, up=(0, 0, 1))
-        assert seen[0].filename == __file__
-    for yaws in (
-        [90.0, 180.0, 1.57, 0.0],
-        [0.0] * 4,
-        [0.0, np.nan, np.inf, 2.0],
-        [1.0, -2.0, 1.57, 3.0],
-        -90.0,
-    ):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            hizvk.OrientedBoxes.from_yaw(centers, 1.0, yaws, up=(0, 0, 1))
 
 
 def test_every_pose_that_fits_is_named() -> None:

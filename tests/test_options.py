@@ -94,7 +94,7 @@ OTHERS: dict[str, tuple[Any, str]] = {
 def test_every_field_arrives_and_no_other_changes(name: str) -> None:
     value, expected = OTHERS[name]
     default = "".join(_core.options_text(hizvk.CullOptions(), hizvk.Outputs()))
-    given, made = options.cull_request(None, None, {})
+    given, made = options.cull_request(None, None, {}, hizvk.Device.cull)
     if name in FIELDS["CullOptions"]:
         given = dataclasses.replace(given, **{name: value})
     else:

@@ -14,7 +14,7 @@ import pytest
 
 import hizvk
 import hizvk.sweeping
-import test_advice
+import test_fill_depth
 import test_foreign
 import test_jobs
 import test_show
@@ -199,13 +199,13 @@ FAULTS = {
     ),
     # Data.
     "sparse depth filled with the nearest": Fault(
-        sparse, "np", lambda _: Numpy(maximum=np.minimum), (test_advice.test_filling_by_loops,)
+        sparse, "np", lambda _: Numpy(maximum=np.minimum), (test_fill_depth.test_filling_by_loops,)
     ),
     "a window one pixel too wide": Fault(
         sparse,
         "_farthest_after",
         lambda farthest: lambda depth, radius: farthest(depth, radius + 1),
-        (test_advice.test_filling_by_loops,),
+        (test_fill_depth.test_filling_by_loops,),
     ),
     "corners of another order": Fault(
         _corners,

@@ -445,6 +445,17 @@ def test_depth_from_points_disc_by_disc() -> None:
         assert ((got - expected)[same] * sign >= -(2.0**-50)).all(), "rounded towards far"
 
 
+def test_discs_that_are_larger_than_the_image() -> None:
+    """A radius in the wrong unit: one after the other these discs would take minutes."""
+    camera = view().resized((720, 1280))
+    positions = np.random.default_rng(4).uniform(-1.0, 1.0, (20_000, 3))
+    image = hizvk.depth_from_points(hizvk.Points(positions), camera, radius=1e6)
+    depth = camera.project(positions).depth
+    depth = depth[(depth >= 0.0) & (depth <= 1.0)]
+    nearest = depth.max() if camera.reversed_z else depth.min()
+    np.testing.assert_allclose(image, nearest, rtol=1e-6)
+
+
 def test_a_cloud_hides_its_own_back(device: hizvk.Device) -> None:
     """Depth from the points themselves, which costs the promise what its documentation says.
 

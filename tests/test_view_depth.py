@@ -13,6 +13,7 @@ import numpy.typing as npt
 import pytest
 
 import hizvk
+from hizvk.view_depth import RayView
 
 SIZE = (37, 61)
 NEAR, FAR = 0.25, 40.0
@@ -168,3 +169,52 @@ def test_a_rendered_image(device: hizvk.Device) -> None:
     np.testing.assert_allclose(image.numpy(kind="z"), 12.5, rtol=1e-5)
     np.testing.assert_allclose(image.numpy(kind="distance"), 12.5 * lengths(camera), rtol=1e-5)
     np.testing.assert_allclose(image.numpy(), NEAR / 12.5, rtol=1e-5)
+
+
+#: Factors of a matrix's rows: the squares of what they make overflow float64, or vanish.
+ROW_FACTORS = [
+    (1e-200, 1.0, 1.0, 1.0),
+    (1.0, 1e-300, 1.0, 1.0),
+    (1e-170, 1e-290, 1e-200, 1.0),
+    (1e200, 1e180, 1.0, 1.0),
+    (1.0, 1.0, 1.0, 1e200),
+    (1e-300, 1e-300, 1e-300, 1e-300),
+]
+
+
+STRETCHED = [
+    (name, factors)
+    for name in ("reversed infinite", "orthographic")
+    for factors in ROW_FACTORS
+    # A depth row far shorter than the constant of w is that of a singular matrix.
+    if name != "orthographic" or factors[3] <= factors[2]
+]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("name", "factors"), STRETCHED)
+def test_rows_of_lengths_far_apart(name: str, factors: tuple[float, float, float, float]) -> None:
+    """Factors of the rows stretch the image, and leave the eye and the axes where they are."""
+    matrix = CASES[name][0].clip_from_world * np.array(factors)[:, None]
+    camera = hizvk.Camera.from_matrices(matrix, size=SIZE, reversed_z=name != "orthographic")
+    seen = RayView(camera)
+    forward = np.subtract(TARGET, EYE) / np.linalg.norm(np.subtract(TARGET, EYE))
+    right = np.cross(forward, (0.0, 1.0, 0.0))
+    right /= np.linalg.norm(right)
+    np.testing.assert_allclose(seen.forward, forward, atol=1e-12)
+    np.testing.assert_allclose(seen.right, right, atol=1e-9)
+    np.testing.assert_allclose(seen.up, np.cross(right, forward), atol=1e-9)
+    if name != "orthographic":
+        assert seen.eye is not None
+        np.testing.assert_allclose(seen.eye, EYE, rtol=1e-9)
+    assert not np.isnan(seen.ray_lengths() if seen.eye is not None else 0.0).any()
+    assert not np.isnan(seen.depth_of(np.full((1, 1), 0.5))).any()
+
+
+def test_rows_that_float64_cannot_hold() -> None:
+    matrix = (
+        CASES["reversed infinite"][0].clip_from_world * np.array([1e200, 1, 1, 1e-200])[:, None]
+    )
+    camera = hizvk.Camera.from_matrices(matrix, size=SIZE, reversed_z=True)
+    with pytest.raises(ValueError, match=r"^camera: expected a matrix whose w row is of about"):
+        RayView(camera)

@@ -1,8 +1,11 @@
 """What newcomers pass at first: it is taken, or the message ends with the way out."""
 
 import pickle
+import subprocess
+import sys
 import warnings
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -16,6 +19,21 @@ DEPTH = np.full(SIZE, 10.0)
 CORNERS = [(0.0, 0.0, -5.0), (1.0, 0.0, -5.0), (1.0, 1.0, -5.0), (0.0, 1.0, -5.0)]
 BALLS = hizvk.Spheres([(0.0, 0.0, -5.0)], 0.5)
 K = [100.0, 0.0, 4.0, 0.0, 100.0, 3.0, 0.0, 0.0, 1.0]
+
+
+class Frame:
+    """What a data frame of pandas or polars has of an array."""
+
+    columns = ("x", "y", "z", "name")
+
+    def __init__(self, numbers: np.ndarray) -> None:
+        self.numbers = numbers
+
+    def to_numpy(self) -> np.ndarray:
+        return self.numbers
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> np.ndarray:
+        return self.numbers
 
 
 def opencv(k: Any, pose: Any, size: Any = SIZE) -> hizvk.Camera:
@@ -37,16 +55,39 @@ def culled(device: hizvk.Device, **more: Any) -> hizvk.CullResult:
 
 WAYS: list[tuple[Callable[[hizvk.Device], object], str]] = [
     # One row, several rows in a line, more columns than three.
-    (lambda _: hizvk.Spheres([0.0, 0.0, -5.0], 1.0), "pass .reshape(-1, 3)"),
+    (
+        lambda _: hizvk.Spheres([0.0, 0.0, -5.0], 1.0),
+        "pass numpy.asarray(centers).reshape(-1, 3)",
+    ),
     (lambda _: hizvk.Spheres(np.zeros(12), 1.0), "pass .reshape(-1, 3)"),
     (lambda _: hizvk.Points(np.zeros(0)), "pass .reshape(0, 3)"),
     (lambda _: hizvk.Points(np.zeros((5, 4))), "pass [:, :3], if these columns are x, y, z"),
-    (lambda _: opencv(K, np.eye(4)), "pass .reshape(3, 3)"),
+    (lambda _: opencv(K, np.eye(4)), "pass numpy.asarray(k).reshape(3, 3)"),
+    # Data frames have no indices of arrays.
+    (
+        lambda _: hizvk.Points(Frame(np.zeros((5, 4)))),
+        "pass positions.to_numpy()[:, :3], if these columns are x, y, z",
+    ),
+    (
+        lambda _: hizvk.Spheres(np.zeros((5, 3)), Frame(np.zeros((5, 1)))),
+        "drop the last axis with radii.to_numpy()[..., 0]",
+    ),
+    (
+        lambda _: hizvk.Mesh(CORNERS, Frame(np.zeros((3, 8), int))),
+        "it looks transposed, pass triangles.to_numpy().T",
+    ),
+    (
+        lambda _: hizvk.Points(Frame(np.array([[0.0, 1.0, 2.0, "car"]], object))),
+        'pass positions[["x", "y", "z"]].to_numpy(), with the names of its columns',
+    ),
     (lambda _: opencv(np.reshape(K, (3, 3)), np.eye(4)[:3].ravel()), "pass .reshape(3, 4)"),
     (lambda _: opencv(np.reshape(K, (3, 3)), np.eye(4), (6, 8, 3)), "pass .shape[:2]"),
     # Meshes.
     (lambda _: hizvk.Mesh(CORNERS, [[0, 1, 2, 3]]), "split each face into triangles first"),
-    (lambda _: hizvk.Mesh(CORNERS, [0, 1, 2, 0, 2, 3]), "pass .reshape(-1, 3)"),
+    (
+        lambda _: hizvk.Mesh(CORNERS, [0, 1, 2, 0, 2, 3]),
+        "pass numpy.asarray(triangles).reshape(-1, 3)",
+    ),
     (lambda _: hizvk.Mesh(CORNERS, [[1, 2, 3], [1, 3, 4]]), "count from 1: subtract 1"),
     (lambda _: hizvk.Mesh(CORNERS, [[0.0, 1.0, 2.0]]), "convert it with .astype(np.int64)"),
     (lambda _: hizvk.Mesh.of("house.glb"), "read the file first"),
@@ -172,6 +213,107 @@ def test_one_valid_instance_keeps_the_hint_away() -> None:
             kind="z",
         )
     assert kept.tolist() == [True, False]
+
+
+def test_plain_arrays_are_told_which_bounds_they_look_like() -> None:
+    for shape, way in (
+        ((7, 3), "hizvk.Points(bounds)"),
+        ((7, 6), "hizvk.Boxes(bounds[:, :3], bounds[:, 3:])"),
+        ((7, 8, 3), "hizvk.Boxes.from_corners(bounds)"),
+        ((7, 4, 4), "hizvk.OrientedBoxes.from_transforms(bounds)"),
+    ):
+        bounds = np.zeros(shape)
+        if shape[1:] == (4, 4):
+            bounds[:] = np.eye(4)
+        with pytest.raises(TypeError) as caught:
+            hizvk.visible(bounds, CAMERA, depth=DEPTH, kind="z")  # type: ignore[arg-type]
+        assert f"; pass {way}, if that is what the numbers are" in str(caught.value)
+        made = eval(way, {"hizvk": hizvk, "bounds": bounds})
+        assert len(made) == len(bounds)
+
+
+@pytest.mark.parametrize(
+    ("call", "word", "meant"),
+    [
+        (lambda: look_at(fov=60), "fov", "fov_y_deg"),
+        (lambda: look_at(fov_y_degs=60), "fov_y_degs", "fov_y_deg"),
+        (lambda: look_at(fov_y_deg=60, znear=0.1), "znear", "near"),
+        (lambda: look_at(fov_y_deg=60, resolution=SIZE), "resolution", "size"),
+        (
+            lambda: hizvk.Camera.orthographic((0, 0, 0), (0, 0, -1), fov=60),  # type: ignore[call-arg]
+            "fov",
+            "height",
+        ),
+        (
+            lambda: hizvk.Camera.from_opencv(K=np.eye(3), pixel_center="half"),  # type: ignore[call-arg]
+            "K",
+            "k",
+        ),
+        (lambda: hizvk.Camera.from_opengl(hfov=60), "hfov", "fov_x_deg"),  # type: ignore[call-arg]
+        (lambda: hizvk.Spheres(np.zeros((2, 3)), radius=1.0), "radius", "radii"),  # type: ignore[call-arg]
+        (lambda: hizvk.Boxes(mins=CORNERS, maxs=CORNERS), "mins", "min"),  # type: ignore[call-arg]
+        (lambda: hizvk.Points(xyz=CORNERS), "xyz", "positions"),  # type: ignore[call-arg]
+        (lambda: hizvk.Mesh(CORNERS, faces=[[0, 1, 2]]), "faces", "triangles"),  # type: ignore[call-arg]
+        (lambda: look_at(fov_y_deg=60, colour=1), "colour", None),
+        (
+            lambda: hizvk.Device().pyramid(DEPTH, CAMERA, kind="z", depth_scale=0.001),  # type: ignore[call-overload]
+            "depth_scale",
+            "scale",
+        ),
+        (
+            lambda: hizvk.Device().occluders(vertices=CORNERS, faces=[[0, 1, 2]]),  # type: ignore[call-overload]
+            "faces",
+            "triangles",
+        ),
+        # Of functions that take options, too, their own parameters count.
+        (lambda: hizvk.sweep(BALLS, [CAMERA], depth=[DEPTH], kind="z"), "depth", "depths"),  # type: ignore[call-arg]
+        (lambda: hizvk.recommend(BALLS, CAMERA, occluder=None), "occluder", "occluders"),  # type: ignore[call-arg]
+        (lambda: hizvk.visible(BALLS, CAMERA, depth=DEPTH, kinds="z"), "kinds", "kind"),  # type: ignore[call-arg]
+        (lambda: colour(np.zeros((6, 8, 3), np.uint8), device_=1), "device_", "device"),
+        (lambda: culled(hizvk.Device(), output=["mask"]), "output", "outputs"),
+        (lambda: hizvk.Tolerance(absolute=0.1), "absolute", "abs"),  # type: ignore[call-arg]
+        (lambda: hizvk.CullOptions(foot_print=4), "foot_print", "footprint"),  # type: ignore[call-arg]
+        (lambda: hizvk.Outputs(masks=True), "masks", "mask"),  # type: ignore[call-arg]
+        (lambda: hizvk.LodBySize(pixel=[4.0]), "pixel", "pixels"),  # type: ignore[call-arg]
+        (lambda: hizvk.DirectionalLight((0, 0, -1), radius=1), "radius", "angular_radius_deg"),  # type: ignore[call-arg]
+        (lambda: hizvk.Device(name="llvmpipe"), "name", "adapter"),  # type: ignore[call-arg]
+        (lambda: hizvk.cube((0, 0, 0), size=8, znear=0.1), "znear", "near"),  # type: ignore[call-arg]
+    ],
+)
+def test_a_word_that_is_no_parameter(call: Callable[[], Any], word: str, meant: str) -> None:
+    with pytest.raises(TypeError, match=f"^{word}: expected no such parameter; ") as refused:
+        call()
+    assert (f"the closest is {meant}, and all are" in str(refused.value)) == (meant is not None)
+    assert ("the closest is" in str(refused.value)) == (meant is not None)
+
+
+def look_at(**more: Any) -> hizvk.Camera:
+    return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), **more)
+
+
+def test_a_function_that_other_processes_cannot_look_up() -> None:
+    """Threads need no name for it, and a function of a module has one."""
+    cameras = [CAMERA] * 2
+
+    def swept(depths: Any, executor: Any) -> hizvk.Sweep:
+        return hizvk.sweep(BALLS, cameras, depths=depths, kind="z", executor=executor)
+
+    text = r"^depths: expected a function on the top level of a module .*, got function <function "
+    for pool in (2, ProcessPoolExecutor(1)):
+        with pytest.raises(TypeError, match=text) as refused:
+            swept(lambda view: DEPTH, pool)
+        assert "resume" not in str(refused.value)
+    with ThreadPoolExecutor(2) as threads:
+        assert swept(lambda view: DEPTH, threads).counts.tolist() == [1, 1]
+    session = (
+        "import hizvk.sweeping.arguments as a\ndef load(view): ...\na.refuse_unsendable(load, "
+    )
+    for runner, refused_there in (("2", True), ("None", False)):
+        run = subprocess.run(
+            [sys.executable, "-"], input=f"{session}{runner})", capture_output=True, text=True
+        )
+        assert (run.returncode != 0) == refused_there
+        assert ("of an interactive session; pass such a function" in run.stderr) == refused_there
 
 
 def test_fractions_of_objects_that_the_image_does_not_hold(device: hizvk.Device) -> None:

@@ -9,6 +9,7 @@ Counts never see these triangles: they get the objects' boxes and the depth imag
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,7 @@ import numpy as np
 
 import hizvk
 from hizvk.bench.catalogue import NAMES, Missing, make
+from hizvk.commands import pipes
 from hizvk.scenes.embree import can_cast, embree_scene
 from hizvk.scenes.scene import box_corners
 from hizvk.scenes.truth import RayCaster
@@ -236,4 +238,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(pipes.run(main))

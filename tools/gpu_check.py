@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Final
 
 import hizvk
 from hizvk import _core
+from hizvk.commands import pipes
 from hizvk.commands.report import adapter_words, version_words
 
 if TYPE_CHECKING:
@@ -229,4 +230,4 @@ def main(
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(pipes.run(main))

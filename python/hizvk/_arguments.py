@@ -17,6 +17,7 @@ import operator
 import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
@@ -60,29 +61,35 @@ def _shape_text(shape: Sequence[int | str]) -> str:
     return f"({inner},)" if len(shape) == 1 else f"({inner})"
 
 
-def explained(texts: Mapping[str, str]) -> Callable[[Callable[P, T]], Callable[P, T]]:
+def explained(
+    texts: Mapping[str, str] = MappingProxyType({}),
+) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """A decorator that says more than Python does about keywords that are missing or unknown.
 
     `texts` has what follows ``<name>: `` in the `TypeError`.
     Its names are parameters without a default, or words that are no parameters and are often passed
     all the same.
+    Of other words that are no parameters, the closest parameter is named.
     """
 
     def decorate(maker: Callable[P, T]) -> Callable[P, T]:
         parameters = inspect.signature(maker).parameters
+        known = frozenset(parameters)
+        told = [name for name in parameters if name not in ("self", "cls")]
         needed = [
             name
             for name in texts
             if name in parameters and parameters[name].default is inspect.Parameter.empty
         ]
-        strange = texts.keys() - parameters.keys()
 
         @functools.wraps(maker)
         def checked(*args: P.args, **kwargs: P.kwargs) -> T:
-            for name in [name for name in needed if name not in kwargs] + sorted(
-                strange & kwargs.keys()
-            ):
-                raise TypeError(f"{name}: {texts[name]}")
+            missing = [name for name in needed if name not in kwargs] if needed else needed
+            if missing or not known.issuperset(kwargs):
+                for name in [*missing, *sorted(kwargs.keys() - known)]:
+                    if name in texts:
+                        raise TypeError(f"{name}: {texts[name]}")
+                refuse_unknown(kwargs, told)
             return maker(*args, **kwargs)
 
         return checked
@@ -90,32 +97,75 @@ def explained(texts: Mapping[str, str]) -> Callable[[Callable[P, T]], Callable[P
     return decorate
 
 
-#: What is meant by words that others use, and that look like another parameter.
-_MEANT: Final = {
-    "depth_scale": "scale",
-    "units": "scale",
-    "unit": "scale",
-    "depth_kind": "kind",
-    "workers": "executor",
-    "n_jobs": "executor",
-    "processes": "executor",
-    "threads": "executor",
+#: What is meant by words that others use, and that look like another parameter; the first that is
+#: one.
+_MEANT: Final[Mapping[str, tuple[str, ...]]] = {
+    "depth_scale": ("scale",),
+    "units": ("scale",),
+    "unit": ("scale",),
+    "depth_kind": ("kind",),
+    "workers": ("executor",),
+    "n_jobs": ("executor",),
+    "processes": ("executor",),
+    "threads": ("executor",),
+    # Of cameras.
+    **dict.fromkeys(
+        ("fov", "fov_y", "fovy", "fov_deg", "vfov", "yfov"), ("fov_y_deg", "fov_x_deg", "height")
+    ),
+    **dict.fromkeys(("fov_x", "fovx", "hfov", "xfov"), ("fov_x_deg", "fov_y_deg", "width")),
+    **dict.fromkeys(("K", "intrinsics", "intrinsic", "camera_matrix"), ("k",)),
+    **dict.fromkeys(
+        ("resolution", "shape", "image_size", "viewport", "width", "height"), ("size",)
+    ),
+    **dict.fromkeys(("position", "origin", "location", "pos"), ("eye", "centers", "positions")),
+    **dict.fromkeys(("at", "lookat", "look_at", "direction", "forward"), ("target",)),
+    **dict.fromkeys(("znear", "z_near", "near_plane", "clip_start"), ("near",)),
+    **dict.fromkeys(("zfar", "z_far", "far_plane", "clip_end"), ("far",)),
+    # Of meshes and points.
+    **dict.fromkeys(("faces", "indices"), ("triangles",)),
+    **dict.fromkeys(("points", "xyz"), ("positions", "vertices")),
+    # Of the others.
+    **dict.fromkeys(("extents", "sizes", "dimensions", "half_extents"), ("half_sizes",)),
+    "absolute": ("abs",),
+    "relative": ("rel",),
+    "name": ("adapter",),
+    "depth_image": ("depth", "depths"),
+    "observer": ("eye",),
+    "radius": ("radii", "angular_radius_deg", "radius_px"),
 }
+#: Words that are less alike have nothing to do with each other.
+_ALIKE: Final = 0.5
 
 
-def refuse_unknown(keywords: Iterable[str], known: Collection[str]) -> None:
-    """A `TypeError` for the first keyword that is not known; it names the closest one that is."""
+def refuse_unknown(
+    keywords: Iterable[str], known: Collection[str], of: Callable[..., object] | None = None
+) -> None:
+    """A `TypeError` for the first keyword that is not known; it names the closest one that is.
+
+    `of` is the function that was called, whose own parameters are told, too.
+    """
     for name in keywords:
         if name not in known:
             # Loaded here: only this error needs it.
             from difflib import get_close_matches
 
-            meant = _MEANT.get(name)
-            closest = meant if meant in known else get_close_matches(name, known, 1, cutoff=0.0)[0]
-            raise TypeError(
-                f"{name}: expected no such parameter; the closest is {closest}, "
-                f"and all are {', '.join(known)}"
-            )
+            told = [*(_own_names(of) if of is not None else ()), *known]
+            meant = [word for word in _MEANT.get(name, ()) if word in told]
+            closest = (meant or get_close_matches(name, told, 1, cutoff=_ALIKE))[:1]
+            which = "".join(f"the closest is {word}, and " for word in closest)
+            raise TypeError(f"{name}: expected no such parameter; {which}all are {', '.join(told)}")
+
+
+def _own_names(function: Callable[..., object]) -> list[str]:
+    """The names of a function's own parameters."""
+    parameters = inspect.signature(function).parameters.values()
+    return [one.name for one in parameters if one.kind is not inspect.Parameter.VAR_KEYWORD]
+
+
+def named(made: type[T]) -> type[T]:
+    """A decorator of data classes whose keywords are refused as those of `explained` are."""
+    made.__init__ = explained()(made.__init__)  # type: ignore[method-assign]
+    return made
 
 
 def _wrong_type(name: str, expected: str, value: object) -> TypeError:
@@ -197,11 +247,26 @@ def shape_hint(shape: Sequence[int | str], sides: Sequence[int]) -> str:
     return ""
 
 
+def _as_code(name: str, value: object, hint: str) -> str:
+    """A hint at an index, as code for what came: lists and data frames become arrays first."""
+    first = f"numpy.asarray({name})" if isinstance(value, (list, tuple)) else ""
+    first = f"{name}.to_numpy()" if hasattr(value, "to_numpy") else first
+    for start in (" .", " ["):
+        hint = hint.replace(start, f" {first}{start[1:]}") if first else hint
+    return hint
+
+
 def _check_shape(
-    name: str, expected: str, array: npt.NDArray[Any], shape: Sequence[int | str], hint: str = ""
+    name: str,
+    expected: str,
+    array: npt.NDArray[Any],
+    shape: Sequence[int | str],
+    hint: str = "",
+    value: object = None,
 ) -> None:
+    """Refuses another shape; `value` is what became the array."""
     if not _fits(shape, array.shape):
-        hint = shape_hint(shape, array.shape) or hint
+        hint = _as_code(name, value, shape_hint(shape, array.shape)) or hint
         raise ValueError(
             f"{name}: expected {expected}, got {_shape_text(array.shape)} {array.dtype}{hint}"
         )
@@ -266,8 +331,11 @@ def floats(
             if array.dtype.kind in "iufO" and array.ndim
             else ""
         )
+        if hasattr(value, "to_numpy") and hasattr(value, "columns"):
+            # A data frame has names of columns beside the numbers, or texts.
+            way = f'; pass {name}[["x", "y", "z"]].to_numpy(), with the names of its columns'
         raise TypeError(f"{name}: expected {expected}, got {got}{way}")
-    _check_shape(name, expected, array, shape, hint)
+    _check_shape(name, expected, array, shape, hint, value)
     return _exact(name, expected, array) if is_whole else _ready(name, array)
 
 
@@ -298,9 +366,9 @@ def floats_or_scalar(name: str, value: object, count: int) -> FloatArray:
             return np.full(count, float(value), dtype=np.float64)  # type: ignore[arg-type]
         except OverflowError:
             raise _wrong_value(name, f"float ({count},) or one number", value) from None
-    value = foreign.as_numpy(name, f"float ({count},) or one number", value)
-    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu":
-        return np.full(count, float(value), dtype=np.float64)
+    array = foreign.as_numpy(name, f"float ({count},) or one number", value)
+    if isinstance(array, np.ndarray) and array.ndim == 0 and array.dtype.kind in "fiu":
+        return np.full(count, float(array), dtype=np.float64)
     return floats(name, value, (count,), why=" or one number")
 
 
@@ -336,8 +404,8 @@ def numbers_of_shape(
             f"{name}: expected {expected}, got {describe(array if array.ndim else value)}"
         )
     if array.shape not in shapes:
-        ways = (shape_hint(shape, array.shape) for shape in shapes)
-        _check_shape(name, expected, array, shapes[-1], next(filter(None, ways), hint))
+        ways = (_as_code(name, value, shape_hint(shape, array.shape)) for shape in shapes)
+        _check_shape(name, expected, array, shapes[-1], next(filter(None, ways), hint), value)
     result: npt.NDArray[np.float64] = np.array(array, dtype=np.float64, order="C")
     if not np.isfinite(result).all():
         raise ValueError(
@@ -565,7 +633,7 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
         )
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
-    value = foreign.as_numpy(name, expected, value)
+    given, value = value, foreign.as_numpy(name, expected, value)
     array = np.asarray(value)
     if array.size == 0 and not hasattr(value, "dtype"):
         array = array.astype(np.bool_)
@@ -576,7 +644,7 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
         raise TypeError(
             f"{name}: expected {expected}, got {describe(array if array.ndim else value)}{way}"
         )
-    _check_shape(name, expected, array, shape)
+    _check_shape(name, expected, array, shape, value=given)
     return copied(name, array, np.bool_)
 
 
@@ -587,7 +655,7 @@ def mesh_ids(
     expected = f"integer ({count},)"
     if is_masked(value) or isinstance(value, (str, bytes)):
         raise _wrong_type(name, expected, value)
-    value = foreign.as_numpy(name, expected, value)
+    given, value = value, foreign.as_numpy(name, expected, value)
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -599,7 +667,7 @@ def mesh_ids(
     if array.dtype.kind not in "iu":
         got = describe(array if array.ndim else value)
         raise TypeError(f"{name}: expected {expected}, got {got}")
-    _check_shape(name, expected, array, (count,))
+    _check_shape(name, expected, array, (count,), value=given)
     if array.size and not (int(array.min()) >= 0 and int(array.max()) < 2**32):
         wrong = int(array.min()) if array.min() < 0 else int(array.max())
         raise ValueError(f"{name}: expected {what} from 0 on, or hizvk.ABSENT, got {wrong}")
@@ -623,7 +691,7 @@ def indices(name: str, value: object, count: int, what: str) -> npt.NDArray[np.u
         raise TypeError(
             f"{name}: expected {expected}, got {describe(array if array.ndim else value)}"
         )
-    _check_shape(name, expected, array, ("K",))
+    _check_shape(name, expected, array, ("K",), value=value)
     array = copied(name, array, array.dtype.newbyteorder("="))
     if array.size and not (int(array.min()) >= 0 and int(array.max()) < count):
         wrong = int(array.min()) if array.min() < 0 else int(array.max())
@@ -641,7 +709,7 @@ def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uin
         )
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
-    value = foreign.as_numpy(name, expected, value)
+    given, value = value, foreign.as_numpy(name, expected, value)
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -656,7 +724,7 @@ def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uin
             f"{name}: expected {expected}, got {describe(array if array.ndim else value)}{way}"
         )
     hint = "; split each face into triangles first" if array.shape[1:] == (4,) else ""
-    _check_shape(name, expected, array, ("T", 3), hint)
+    _check_shape(name, expected, array, ("T", 3), hint, given)
     array = copied(name, array, array.dtype.newbyteorder("="))
     if array.size:
         low, high = int(array.min()), int(array.max())

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-import warnings
 from typing import TYPE_CHECKING, Final, TypedDict
 
 import numpy as np
 
 from . import _arguments, _rotations, foreign
-from .errors import HizWarning
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,11 +23,6 @@ Pose = tuple[str, "npt.NDArray[np.float64]"]
 
 #: The length of OpenCV's longest list of distortion coefficients.
 MOST_COEFFICIENTS = 14
-#: Angles of view are usually multiples of so many degrees,
-ROUND_DEG: Final = 5
-#: and 1.0472, which is 60 degrees in radians with four digits, is off by half of this.
-ANGLE_ROOM: Final = 3e-4
-
 #: What is added to cx and cy, so that the first pixel's centre comes to (0.5, 0.5).
 TO_HALF: Final = {"integer": 0.5, "half": 0.0}
 _CENTERS = (
@@ -155,37 +148,9 @@ def intrinsics(k: object) -> npt.NDArray[np.float64]:
     return result
 
 
-def field_of_view(name: str, value: object, *, stacklevel: int = 3) -> float:
-    """An angle of view in degrees; warns of one that is a usual angle in radians.
-
-    Nobody asks for 1.0472 degrees, which is 60 degrees in radians.
-    `stacklevel` is that of the caller, from here.
-    """
-    angle = _arguments.number(name, value, above=0.0, below=180.0)
-    meant = math.degrees(angle)
-    usual = ROUND_DEG * round(meant / ROUND_DEG)
-    if 0.0 < usual < 180.0 and abs(meant - usual) < ANGLE_ROOM:
-        warnings.warn(
-            f"{name}: {angle:.6g} degrees are as narrow as a telescope's view, and {angle:.6g} "
-            f"radians are {usual} degrees; if that is meant, pass {usual}",
-            HizWarning,
-            stacklevel=stacklevel,
-        )
-    return angle
-
-
-def hint_at_size(k: npt.NDArray[np.float64], size: Size) -> None:
-    """Warns of a camera matrix that looks like that of a larger image."""
-    (cx, cy), (height, width) = k[:2, 2].tolist(), size
-    if cx > width and cy > height:
-        warnings.warn(
-            f"k, size: the principal point ({cx:g}, {cy:g}) lies below and beside the image of "
-            f"{size} pixels; if k belongs to a larger image, pass the size of that image, and take "
-            f"camera.resized({size})",
-            HizWarning,
-            # Over the constructor and its decorator to the caller.
-            stacklevel=4,
-        )
+def field_of_view(name: str, value: object) -> float:
+    """An angle of view in degrees."""
+    return _arguments.number(name, value, above=0.0, below=180.0)
 
 
 def refuse_distortion(distortion: object) -> None:

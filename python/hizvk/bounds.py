@@ -79,6 +79,7 @@ class Spheres:
     centers: FloatArray
     radii: FloatArray
 
+    @_arguments.explained()
     def __init__(self, centers: npt.ArrayLike, radii: npt.ArrayLike) -> None:
         centers = _arguments.floats("centers", centers, ("N", 3))
         object.__setattr__(self, "centers", centers)
@@ -111,12 +112,14 @@ class Boxes:
     min: FloatArray
     max: FloatArray
 
+    @_arguments.explained()
     def __init__(self, min: npt.ArrayLike, max: npt.ArrayLike) -> None:
         low = _arguments.floats("min", min, ("N", 3))
         object.__setattr__(self, "min", low)
         object.__setattr__(self, "max", _arguments.floats("max", max, (len(low), 3)))
 
     @classmethod
+    @_arguments.explained()
     def from_corners(cls, corners: npt.ArrayLike) -> Self:
         """The axis-aligned boxes around corners, in any order.
 
@@ -184,6 +187,7 @@ class OrientedBoxes:
     half_sizes: FloatArray
     rotations: FloatArray
 
+    @_arguments.explained()
     def __init__(
         self, centers: npt.ArrayLike, half_sizes: npt.ArrayLike, rotations: npt.ArrayLike
     ) -> None:
@@ -291,6 +295,7 @@ class OrientedBoxes:
         return cls(centers, half_sizes, _rotations.from_quaternions(w, x, y, z))
 
     @classmethod
+    @_arguments.explained()
     def from_transforms(
         cls, world_from_box: npt.ArrayLike, half_sizes: npt.ArrayLike = 0.5
     ) -> Self:
@@ -411,6 +416,7 @@ class Points:
 
     positions: FloatArray
 
+    @_arguments.explained()
     def __init__(self, positions: npt.ArrayLike) -> None:
         checked = _arguments.floats("positions", positions, ("N", 3))
         object.__setattr__(self, "positions", checked)

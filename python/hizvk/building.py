@@ -8,6 +8,7 @@ from . import _arguments
 from ._on_device import check_owner
 from .camera import Camera
 from .errors import LimitError
+from .other_cameras import other_camera
 from .renewal import Source
 from .resources import DepthImage, Pyramid
 from .samples import checked_samples
@@ -107,9 +108,7 @@ def receivers(
             got = _arguments.describe(kind)
             raise TypeError(f"kind: expected None beside a DepthImage, got {got}")
         if camera != depth.camera:
-            raise ValueError(
-                f"camera: expected that of the depth image, {depth.camera!r}, got {camera!r}"
-            )
+            raise other_camera("camera", "that of the depth image", depth.camera, camera)
         image = depth._inner
     else:
         check_side(device, camera)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from . import _arguments, _camera_arguments
+from . import _arguments, _camera_arguments, camera_hints
 from ._core import Camera as CoreCamera
 from ._core import frustum_matrix
 from .projection import Projected, projected
@@ -97,6 +97,7 @@ class Camera:
     # Constructors.
 
     @classmethod
+    @_arguments.explained()
     def look_at(
         cls,
         eye: npt.ArrayLike,
@@ -139,11 +140,13 @@ class Camera:
         """
         view = _camera_arguments.view(eye, target, up)
         fov_y_deg = _camera_arguments.field_of_view("fov_y_deg", fov_y_deg)
+        camera_hints.at_radians("fov_y_deg", fov_y_deg, stacklevel=3)
         image = _camera_arguments.perspective_image(size, near, far, reversed_z)
         inner = CoreCamera.perspective(**view, fov_y=math.radians(fov_y_deg), **image)
         return cls._made(inner, "look_at", **view, fov_y_deg=fov_y_deg, **image)
 
     @classmethod
+    @_arguments.explained()
     def frustum(
         cls,
         eye: npt.ArrayLike,
@@ -189,6 +192,7 @@ class Camera:
         return cls._made(inner, "frustum", **view, **borders, **image)
 
     @classmethod
+    @_arguments.explained()
     def orthographic(
         cls,
         eye: npt.ArrayLike,
@@ -309,7 +313,7 @@ class Camera:
         pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
         image = _camera_arguments.perspective_image(size, near, far, reversed_z)
         _camera_arguments.refuse_distortion(distortion)
-        _camera_arguments.hint_at_size(k, image["size"])
+        camera_hints.at_intrinsics(k, image["size"], stacklevel=3)
         projection = _pinhole(k, pixel_center, image)
         seen = {"k": k, "pixel_center": pixel_center}
         return cls._posed("from_opencv", seen, projection, pose, image, image["reversed_z"])
@@ -376,7 +380,7 @@ class Camera:
         model, params, k = _camera_arguments.colmap_intrinsics(model, params)
         pose = _camera_arguments.colmap_pose(qvec, tvec, camera_from_world, world_from_camera)
         image = _camera_arguments.perspective_image(size, near, far, reversed_z)
-        _camera_arguments.hint_at_size(k, image["size"])
+        camera_hints.at_intrinsics(k, image["size"], stacklevel=3)
         projection = _pinhole(k, "half", image)
         seen = {"model": model, "params": params}
         return cls._posed("from_colmap", seen, projection, pose, image, image["reversed_z"])
@@ -473,12 +477,13 @@ class Camera:
             k = _camera_arguments.intrinsics(k)
             pixel_center = _camera_arguments.pixel_center(pixel_center)
             _camera_arguments.refuse_distortion(distortion)
-            _camera_arguments.hint_at_size(k, image["size"])
+            camera_hints.at_intrinsics(k, image["size"], stacklevel=3)
             seen = {"k": k, "pixel_center": pixel_center}
             clip_from_camera = _pinhole(k, pixel_center, image) @ _OPENCV_FROM_OPENGL
         else:
             given = fov_x_deg if way == "fov_x_deg" else fov_y_deg
-            angle = _camera_arguments.field_of_view(way, given, stacklevel=4)
+            angle = _camera_arguments.field_of_view(way, given)
+            camera_hints.at_radians(way, angle, stacklevel=3)
             seen = {way: angle}
             height, width = image["size"]
             side = width if way == "fov_x_deg" else height
@@ -647,16 +652,17 @@ class Camera:
 
     def __reduce__(self) -> tuple[Callable[..., Camera], tuple[str, dict[str, Any]]]:
         name, arguments = self._recipe
-        return _again, (name, dict(arguments))
+        return made_again, (name, dict(arguments))
 
 
-def _again(name: str, arguments: dict[str, Any]) -> Camera:
-    """Makes a pickled camera by the call that made the first one."""
+def made_again(name: str, arguments: dict[str, Any]) -> Camera:
+    """Makes a camera by a call that made one, such as a pickled one; without hints."""
     if name == "resized":
         camera: Camera = arguments["camera"]
         return camera.resized(arguments["size"])
     maker: Callable[..., Camera] = getattr(Camera, name)
-    return maker(**arguments)
+    with camera_hints.silenced():
+        return maker(**arguments)
 
 
 #: OpenCV's camera axes (y down, z forward) from OpenGL's (y up, looking along -z).

@@ -17,6 +17,7 @@ import numpy as np
 import hizvk
 
 from . import _core
+from .commands import pipes
 from .doctor import checks, install_hint
 
 if TYPE_CHECKING:
@@ -36,9 +37,12 @@ DELEGATED: Final = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns the exit code.
 
-    0: good; 1: something is wrong; 2: wrong usage.
+    0: good; 1: something is wrong; 2: wrong usage; 141: nobody read the output to its end.
     """
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    return pipes.run(lambda: _command(list(sys.argv[1:] if arguments is None else arguments)))
+
+
+def _command(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(
         prog="hizvk", description="Occlusion culling that never hides what can be seen."
     )

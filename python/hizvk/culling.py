@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._on_device import owned
 from .hints import Question
+from .other_cameras import other_camera
 from .resources import A_PYRAMID, Pyramid
 from .result import CullResult
 from .views import ViewsResult, pairs
@@ -64,7 +65,7 @@ def culled_views(
     cameras, pyramids = pairs(camera, pyramid, device)
     for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
         if one != of.camera:
-            raise ValueError(_other_camera(f"camera[{number}]", one, of))
+            raise _other_camera(f"camera[{number}]", one, of)
         check_coverage(options, of)
     if outputs.pixels:
         raise ValueError(
@@ -96,7 +97,7 @@ def checked_pyramid(device: Maker, camera: Camera, pyramid: object) -> Pyramid:
     """A pyramid of this device, and of this camera."""
     found = owned("pyramid", pyramid, Pyramid, *A_PYRAMID, device=device)
     if camera != found.camera:
-        raise ValueError(_other_camera("camera", camera, found))
+        raise _other_camera("camera", camera, found)
     return found
 
 
@@ -109,7 +110,7 @@ def check_coverage(options: CullOptions, pyramid: Pyramid) -> None:
         )
 
 
-def _other_camera(name: str, camera: Camera, pyramid: Pyramid) -> str:
+def _other_camera(name: str, camera: Camera, pyramid: Pyramid) -> ValueError:
     """Why a camera cannot cull with the pyramid of another one, and the way out."""
     way = "depth of one camera says nothing about another one"
     if camera.resized(pyramid.size) == pyramid.camera:
@@ -117,4 +118,4 @@ def _other_camera(name: str, camera: Camera, pyramid: Pyramid) -> str:
             f"pass camera.resized({pyramid.size}), the same view; "
             "the promise is about an image of that size"
         )
-    return f"{name}: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}"
+    return other_camera(name, "the camera of the pyramid", pyramid.camera, camera, way)

@@ -108,6 +108,7 @@ class Device(StaysInProcess):
     **Threads.** Any number may use one device, or devices of their own.
     """
 
+    @_arguments.explained()
     def __init__(self, adapter: str | int | None = None) -> None:
         expected = "an adapter's index, a part of its name, or None"
         if isinstance(adapter, (bool, np.bool_)) or not isinstance(
@@ -132,6 +133,7 @@ class Device(StaysInProcess):
         """The largest height or width of a depth image on this device."""
         return self._engine.max_image_side()
 
+    @_arguments.explained()
     def instances(
         self,
         bounds: Bounds,
@@ -214,6 +216,7 @@ class Device(StaysInProcess):
         cull: FaceCull = "none",
     ) -> Occluders: ...
 
+    @_arguments.explained()
     def occluders(
         self,
         vertices: Any,
@@ -282,6 +285,7 @@ class Device(StaysInProcess):
         max_occluders: int | None = None,
     ) -> tuple[int, int, int, int] | None: ...
 
+    @_arguments.explained()
     def render_depth(
         self,
         occluders: Occluders,
@@ -432,6 +436,7 @@ class Device(StaysInProcess):
         depths: Depths = "farthest",
     ) -> Pyramid: ...
 
+    @_arguments.explained()
     def pyramid(
         self,
         depth: Any,
@@ -740,7 +745,7 @@ class Device(StaysInProcess):
             If the device cannot hold the outputs.
         """
         owned("instances", instances, Instances, *SOME_INSTANCES, device=self)
-        options, outputs = cull_request(options, outputs, keywords)
+        options, outputs = cull_request(options, outputs, keywords, self.cull)
         wait = _arguments.flag("wait", wait)
         restriction = among_of(among, instances, self)
         request = options, outputs, restriction, wait
@@ -794,7 +799,7 @@ class Device(StaysInProcess):
         owned("instances", instances, Instances, *SOME_INSTANCES, device=self)
         _arguments.instance("camera", camera, Camera, "a Camera")
         checked_pyramid(self, camera, pyramid)
-        options = cull_options(options, keywords)
+        options = cull_options(options, keywords, self.cull_approximate)
         negligible = _arguments.integer("negligible_px", negligible_px, low=0, high=2**32 - 1)
         check_coverage(options, pyramid)
         culling = self._engine.cull_approximate(
@@ -1019,7 +1024,7 @@ class Device(StaysInProcess):
         _arguments.choice("depths", depths, words(Depths))
         drawn = None if occluders is None else occluders._inner
         more = checked_more(two_passes, samples, views, is_drawn=drawn is not None)
-        options, outputs = cull_request(options, outputs, keywords)
+        options, outputs = cull_request(options, outputs, keywords, self.warm_up)
         self._engine.warm_up(
             instances._inner,
             camera._inner,

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 import numpy as np
 
 from .bounds import Boxes, Points
-from .camera import Camera
+from .camera import Camera, made_again
 from .sparse import is_sparse
-from .unit_hints import all_are_hidden, none_is_hidden, whole_without_scale
+from .unit_hints import all_are_hidden, none_is_hidden
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -122,7 +122,7 @@ class Question:
                     "bounds, coverage: nothing covers a pixel's centre: all are too small, "
                     'or outside of the view; coverage="area" keeps small ones',
                 )
-            return _outside(stats.tested, self.camera, bounds)
+            return _outside(stats.tested, self.camera, self._known_bounds(bounds))
         if 2 * stats.invalid > stats.tested:
             share = "all" if stats.invalid == stats.tested else f"{stats.invalid:,} of"
             return (
@@ -162,22 +162,21 @@ class Question:
         if self._known(coarse).any():
             if self.pyramid._is_rendered:
                 return ()  # in the units of the occluders
-            is_whole = whole_without_scale(self.pyramid._source.given)
             middles = middles_of(self._known_bounds(bounds))
-            return none_is_hidden(self.camera, middles, self.depths, is_whole=is_whole)
+            return none_is_hidden(self.camera, middles, self.depths, self.pyramid._source.given)
         known = self._known(0)
         if not known.any():
             return (
                 "depth: every pixel is far, so nothing can be hidden; if something should be "
-                "there, check kind and scale: numbers that do not lie between the camera's near "
-                "and far planes count as no data",
+                "there, check its numbers, kind and scale: what is infinite or NaN, or does not "
+                "lie between the camera's near and far planes, counts as no data",
             )
         if self.pyramid._is_rendered:
             return ()  # no depth is missing: what is far is sky
         if is_sparse(known):
             return (
-                f"depth: {100.0 * known.mean():.1f} % of the pixels have a depth, hardly any of "
-                "them beside another, and empty ones are far, so next to nothing can be hidden; if "
+                f"depth: {100.0 * known.mean():.1f} % of the pixels have a depth, and hardly any "
+                "2x2 of them all four; empty ones are far, so next to nothing can be hidden; if "
                 "depth is missing there (a LiDAR, not the sky), hizvk.fill_depth fills it and "
                 "says what that costs the promise",
             )
@@ -219,11 +218,10 @@ def posed_otherwise(camera: Camera) -> list[tuple[str, Camera]]:
         return []
     other_way = ways[1 - ways.index(way)]
     turned = TURNED @ pose if way == ways[0] else pose @ TURNED
-    make = getattr(Camera, name)
     axes = "the camera's y and z turned round, as between the poses of OpenCV and OpenGL"
     return [
-        (axes, make(**{way: turned}, **arguments)),
-        (f"the pose as {other_way}", make(**{other_way: pose}, **arguments)),
+        (axes, made_again(name, {way: turned, **arguments})),
+        (f"the pose as {other_way}", made_again(name, {other_way: pose, **arguments})),
     ]
 
 

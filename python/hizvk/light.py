@@ -26,6 +26,7 @@ def _corner(name: str, value: object) -> tuple[float, float, float]:
     return corner
 
 
+@_arguments.named
 @dataclass(frozen=True)
 class DirectionalLight:
     """A light at infinity, such as the sun, and what can receive its shadows.

@@ -50,6 +50,7 @@ def _list(
     return given
 
 
+@_arguments.named
 @dataclass(frozen=True)
 class LodByError:
     """The coarsest LOD whose error in the image is at most so many pixels.
@@ -92,6 +93,7 @@ class LodByError:
         object.__setattr__(self, "pixels", pixels)
 
 
+@_arguments.named
 @dataclass(frozen=True)
 class LodByDistance:
     """LOD l + 1 where all of the bounds are farther than ``thresholds[l]``.
@@ -174,6 +176,7 @@ class LodByDistance:
         return cls([near / (depth + (1.0 - depth) * share) for depth in from_far])
 
 
+@_arguments.named
 @dataclass(frozen=True)
 class LodBySize:
     """LOD l + 1 where the bounds are less than ``pixels[l]`` wide in every direction.

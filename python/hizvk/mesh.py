@@ -53,6 +53,7 @@ class Mesh:
     triangles: npt.NDArray[np.uint32]
     transforms: FloatArray | None
 
+    @_arguments.explained()
     def __init__(
         self,
         vertices: npt.ArrayLike,

@@ -16,6 +16,7 @@ from .device import Device, maker_of
 from .errors import HizWarning
 from .hints import Counted, Question, Tally, middles_of
 from .options import Outputs, cull_options
+from .other_cameras import other_camera
 from .resources import DepthImage, Pyramid
 from .unit_hints import all_are_hidden, sampled
 
@@ -49,9 +50,6 @@ class _Default:
 
 #: The counts that hints look at.
 _COUNTS = Outputs(mask=False, verdicts=True, indices=False, draws=False)
-
-#: The parameters of `visible` that are no options.
-_OWN = ("depth", "kind", "scale", "invalid", "tolerance", "device", "options")
 
 _defaults: dict[int, _Default] = {}
 
@@ -143,15 +141,13 @@ def visible(
     """
     kind_and_arrays = as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
-    options = cull_options(options, keywords, _OWN)
+    options = cull_options(options, keywords, visible)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
     if isinstance(depth, DepthImage):
         device = maker_of(depth) if device is None else device
         if camera != depth.camera:
-            raise ValueError(
-                f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}"
-            )
+            raise other_camera("camera", "the camera of depth", depth.camera, camera)
         for name, value in (("kind", kind), ("invalid", invalid), ("tolerance", tolerance)):
             if value is not None:
                 got = _arguments.describe(value)

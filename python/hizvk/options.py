@@ -134,6 +134,7 @@ def _meshes(name: str, value: object) -> tuple[MeshLods, ...] | None:
     return tuple(value)
 
 
+@_arguments.named
 @dataclass(frozen=True)
 class DrawTemplate:
     """The numbers of a draw of the kept instances that a cull does not find out.
@@ -172,6 +173,7 @@ class DrawTemplate:
 MAX_LODS: Final = 8
 
 
+@_arguments.named
 @dataclass(frozen=True, init=False)
 class MeshLods:
     """The levels of detail (LODs) of one mesh, from the finest to the coarsest.
@@ -246,6 +248,7 @@ class MeshLods:
         ]
 
 
+@_arguments.named
 @dataclass(frozen=True, kw_only=True)
 class CullOptions:
     """How a cull decides.
@@ -362,6 +365,7 @@ class CullOptions:
         _check_fields(self)
 
 
+@_arguments.named
 @dataclass(frozen=True, kw_only=True)
 class Outputs:
     """What a cull makes.
@@ -488,28 +492,29 @@ _NAMED: Final[dict[frozenset[str], Outputs]] = {}
 
 
 def cull_options(
-    options: object, keywords: Mapping[str, Any], own: Collection[str] = ()
+    options: object, keywords: Mapping[str, Any], of: Callable[..., object]
 ) -> CullOptions:
     """The options (None: the defaults), with `keywords` in the place of their fields.
 
-    `own` has more parameters of the caller's function, for the error of an unknown one.
+    `of` is the function that takes both, for the error of an unknown keyword.
     """
     chosen = _OPTIONS
     if options is not None:
         chosen = _arguments.instance("options", options, CullOptions, "a CullOptions or None")
-    _arguments.refuse_unknown(keywords, (*own, *OptionKeywords.__annotations__))
+    _arguments.refuse_unknown(keywords, OptionKeywords.__annotations__, of)
     return _replaced(chosen, keywords) if keywords else chosen
 
 
 def cull_request(
-    options: object, outputs: object, keywords: Mapping[str, Any]
+    options: object, outputs: object, keywords: Mapping[str, Any], of: Callable[..., object]
 ) -> tuple[CullOptions, Outputs]:
-    """Both objects of a cull, from what `Device.cull` was given."""
-    _arguments.refuse_unknown(keywords, CullKeywords.__annotations__)
+    """Both objects of a cull, from what `of` was given, such as `Device.cull`."""
+    _arguments.refuse_unknown(keywords, CullKeywords.__annotations__, of)
     names = ("pixel_budget", "capacity", "draw", "meshes", "emit", "placement")
     of_outputs = {name: keywords[name] for name in names if name in keywords}
     of_options = {name: keywords[name] for name in keywords if name not in of_outputs}
     if outputs is None:
         outputs = _OUTPUTS
     made = outputs if isinstance(outputs, Outputs) else _outputs_of(outputs)
-    return cull_options(options, of_options), _replaced(made, of_outputs) if of_outputs else made
+    chosen = cull_options(options, of_options, of)
+    return chosen, _replaced(made, of_outputs) if of_outputs else made

@@ -140,7 +140,7 @@ def colour_points(
     points = _arguments.instance("points", points, Points, _A_CLOUD)
     sampling = _arguments.choice("sampling", sampling, words(Sampling))  # type: ignore[assignment]
     weight = _arguments.choice("weight", weight, words(ColourWeight))  # type: ignore[assignment]
-    options = cull_options(options, keywords)
+    options = cull_options(options, keywords, colour_points)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
     if not isinstance(views, Iterable) or isinstance(views, (str, bytes, np.ndarray)):
@@ -213,6 +213,7 @@ def _view(
     return camera, depth, np.require(array, wanted, ["C", "A"])
 
 
+@_arguments.explained()
 def depth_from_points(
     points: Points, camera: Camera, *, radius: float = 0.0, radius_px: float = 0.0
 ) -> npt.NDArray[np.float32]:
@@ -279,6 +280,6 @@ def depth_from_points(
                 "pixels have a depth, so next to nothing can be hidden; pass radius=, half the "
                 "distance between neighbours, or radius_px=1",
                 HizWarning,
-                stacklevel=2,
+                stacklevel=3,
             )
     return image

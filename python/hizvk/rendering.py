@@ -9,6 +9,7 @@ from ._on_device import owned
 from ._types import Rasteriser, words
 from .camera import Camera
 from .drawing import Drawing, chosen, limit
+from .other_cameras import other_camera
 from .progress import Progress, check_progress
 from .resources import SOME_OCCLUDERS, DepthImage, Occluders
 
@@ -59,9 +60,7 @@ def rendered(
             if value != default:
                 raise ValueError(f"{name}: expected {default!r} beside into, got {value!r}")
         if camera is not None and camera != into.camera:
-            raise ValueError(
-                f"camera: expected None or that of into, {into.camera!r}, got {camera!r}"
-            )
+            raise other_camera("camera", "None or that of into", into.camera, camera)
         return device._engine.render_depth_into(into._inner, occluders._inner, *what)
     camera = _arguments.instance("camera", camera, Camera, "a Camera")
     if size is not None:

@@ -320,6 +320,9 @@ class CullResult(PicturedResult, Awaited[CoreCulling]):
     def hints(self) -> tuple[str, ...]:
         """What looks like a mistake, in sentences; empty if nothing does.
 
+        It counts verdicts, so ``outputs`` of the cull have to name ``"verdicts"``, as the default
+        does.
+
         - Everything is outside of the view.
         - The bounds are points of size zero, with ``coverage="sample"``.
         - Depth is far everywhere, or sparse.

@@ -25,6 +25,7 @@ SPARSE_PIXELS: Final = 0.25
 SPARSE_BLOCKS: Final = 0.1
 
 
+@_arguments.explained()
 def fill_depth(
     depth: npt.ArrayLike,
     radius_px: int,

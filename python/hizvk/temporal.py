@@ -17,6 +17,7 @@ from ._processes import cached_property
 from .camera import Camera
 from .naming import named
 from .options import cull_options
+from .other_cameras import other_camera
 from .resources import DepthImage, Pyramid
 from .result import CullResult, shared
 
@@ -215,7 +216,7 @@ class Temporal(Allocated[CoreTwoPasses]):
             If the device cannot hold the image.
         """
         _arguments.instance("camera", camera, Camera, "a Camera")
-        chosen = cull_options(options, keywords)
+        chosen = cull_options(options, keywords, self.late)
         if chosen.lod is not None:
             raise ValueError(
                 "lod: expected None, because the passes answer masks, which tell no levels of "
@@ -224,9 +225,7 @@ class Temporal(Allocated[CoreTwoPasses]):
             )
         pyramid = self._pyramid(camera, depth, kind, scale, invalid, levels)
         if pyramid.camera != camera:
-            raise ValueError(
-                f"camera: expected the camera of depth, {pyramid.camera!r}, got {camera!r}"
-            )
+            raise other_camera("camera", "the camera of depth", pyramid.camera, camera)
         return PassResult(self._device, self._inner.late(camera._inner, pyramid._inner, chosen))
 
     def _pyramid(

@@ -10,6 +10,7 @@ from . import _arguments
 __all__ = ["Tolerance", "numbers_of"]
 
 
+@_arguments.named
 @dataclass(frozen=True)
 class Tolerance:
     """How far the depths of an image may lie before the surfaces that they measure.

@@ -3,11 +3,12 @@
 Nothing tells such numbers apart by themselves.
 What tells is the answer: everything in view is hidden, or nothing is, and the depth image is
 hundreds of times as far away as all that was tested, or as near.
+A factor of 100 counts if without it most of what was tested lies at the depth of its pixels.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -36,6 +37,13 @@ __all__ = [
 APART: Final = 200.0
 #: For whole numbers without a scale: they are rarely metres.
 WHOLE_APART: Final = 50.0
+#: Centimetres and metres differ by so much, which scenes do that are as they should be;
+CENTI: Final = 100.0
+#: it is a mistake if, without this factor, as large a share of at least so many instances
+LIKELY: Final = 0.5
+ENOUGH: Final = 8
+#: lies at the depth of its pixel, up to this share of it.
+AT_DEPTH: Final = 0.25
 #: One instance says little about a scene.
 LEAST: Final = 2
 #: About so many pixels of an image are looked at.
@@ -106,6 +114,12 @@ def all_are_hidden(
             f"{instances / image:,.0f} times as far away as the depth image ({both}); if "
             "that is not meant, bring both to the same units, by scale or by the positions",
         )
+    if _are_at_depth(camera, middles / CENTI, depth):
+        return (
+            f"bounds, depth: all {count:,} in view are hidden, and most middles / {CENTI:g} lie at "
+            f"the depth of their pixels ({both}); if positions are in centimetres and depth is in "
+            f"metres, pass scale={CENTI:g}, or positions / {CENTI:g}",
+        )
     if not asked:
         return ()
     return (
@@ -115,7 +129,7 @@ def all_are_hidden(
 
 
 def none_is_hidden(
-    camera: Camera, middles: _Doubles, read: Callable[[], _Doubles], *, is_whole: bool
+    camera: Camera, middles: _Doubles, read: Callable[[], _Doubles], given: DepthArray | None
 ) -> tuple[str, ...]:
     """Hints where nothing in view is hidden, and the image is not empty.
 
@@ -123,24 +137,53 @@ def none_is_hidden(
     ----------
     camera, middles, read
         As for `all_are_hidden`.
-    is_whole : bool
-        Whether the image holds whole numbers, without a scale.
+    given : DepthArray, optional
+        The checked image, where it came as an array.
     """
     if not len(middles):
         return ()
-    found = _medians(camera, middles, read())
+    depth = read()
+    found = _medians(camera, middles, depth)
     if found is None:
         return ()
     count, instances, image = found
-    if image < (WHOLE_APART if is_whole else APART) * instances:
+    is_whole = whole_without_scale(given)
+    unit, scale = "millimetres", 0.001
+    if _are_at_depth(camera, middles, depth / CENTI):
+        unit, scale = "centimetres", 1.0 / CENTI
+    elif image < (WHOLE_APART if is_whole else APART) * instances:
         return ()
+    way = f"if it is in {unit} and positions are in metres, pass scale={scale:g}"
+    if given is not None and given.kind not in METRIC:
+        way = "if near and far of the camera are in other units than positions, bring them to those"
     what = "whole numbers without scale count as world units, and " if is_whole else ""
     return (
         f"depth, scale: {what}nothing is hidden, because the depth image is "
         f"{image / instances:,.0f} times as far away as the {count:,} in view "
-        f"({_both(found, 'in the median')}); if "
-        "it is in millimetres and positions are in metres, pass scale=0.001",
+        f"({_both(found, 'in the median')}); {way}",
     )
+
+
+def _are_at_depth(camera: Camera, middles: _Doubles, depth: _Doubles) -> bool:
+    """Whether most middles in view lie at about the depth that the image has there.
+
+    `depth` may be of any size: its pixels divide the view evenly.
+    """
+    view = RayView(camera)
+    if view.is_parallel or not depth.size:
+        return False
+    x, y, _, w = view.clip_of(middles).T
+    with np.errstate(invalid="ignore"):
+        seen = (np.abs(x) < w) & (np.abs(y) < w) & (w > 0.0)
+    if seen.sum() < ENOUGH:
+        return False
+    x, y, w = x[seen], y[seen], w[seen]
+    rows, columns = depth.shape
+    row = (0.5 * (1.0 - y / w) * rows).astype(np.intp).clip(0, rows - 1)
+    column = (0.5 * (1.0 + x / w) * columns).astype(np.intp).clip(0, columns - 1)
+    there = depth[row, column]
+    with np.errstate(invalid="ignore"):
+        return bool((np.abs(w - there) <= AT_DEPTH * there).mean() >= LIKELY)
 
 
 def _medians(camera: Camera, middles: _Doubles, depth: _Doubles) -> tuple[int, float, float] | None:
@@ -165,7 +208,7 @@ def _both(found: tuple[int, float, float], where: str) -> str:
     )
 
 
-def whole_without_scale(given: Any) -> bool:
+def whole_without_scale(given: DepthArray | None) -> bool:
     """Whether a checked image holds a sensor's whole numbers as world units."""
     return bool(
         given is not None

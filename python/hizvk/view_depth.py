@@ -85,16 +85,24 @@ def converted(
         for axis, sides in enumerate(depth.shape):
             lengths = reduce.reduceat(lengths, np.arange(sides) << level, axis=axis)
         z *= lengths
-    return z.astype(np.float32)
+    with np.errstate(over="ignore"):
+        return z.astype(np.float32)
 
 
 class RayView:
     """A camera's rays: its axes, what its depth means, and positions of places in its image.
 
+    Rows of a matrix may have lengths far apart, so each is brought to length 1 before it is used.
+
     Parameters
     ----------
     camera : Camera
         Any camera.
+
+    Raises
+    ------
+    ValueError
+        If float64 cannot hold the rows about a w row of length 1.
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -104,22 +112,29 @@ class RayView:
         self._rows: _Doubles = np.array(inner.rows(), np.float64)
         #: The rows are about this point.
         self._origin: _Doubles = np.array(inner.origin(), np.float64)
-        w_length = float(np.linalg.norm(self._rows[3, :3]))
+        w_length = _length(self._rows[3, :3])
         self.is_parallel = w_length == 0.0
         self.is_bare = self.is_parallel and not inner.is_posed()
-        self._rows /= self._rows[3, 3] if self.is_parallel else w_length
-        if self.is_parallel:
-            self._slope = float(np.linalg.norm(self._rows[2, :3])) * (
-                -1.0 if self.reversed_z else 1.0
+        longest = float(np.abs(self._rows).max())
+        with np.errstate(over="ignore"):
+            self._rows /= self._rows[3, 3] if self.is_parallel else w_length
+        if not np.isfinite(self._rows).all():
+            raise ValueError(
+                "camera: expected a matrix whose w row is of about the size of the other rows, got "
+                f"{w_length:g} beside {longest:g}; scale the rows of the projection alike"
             )
+        if self.is_parallel:
+            self._slope = _length(self._rows[2, :3]) * (-1.0 if self.reversed_z else 1.0)
             #: Unit vector along the view.
             self.forward: _Doubles = self._rows[2, :3] / self._slope
             self.eye: _Doubles | None = None
         else:
             self.forward = self._rows[3, :3]
             #: Where all rays start; None for parallel rays.
-            middle = [0, 1, 3]
-            self.eye = self._origin - np.linalg.solve(self._rows[middle, :3], self._rows[middle, 3])
+            directions, lengths = _directions(self._rows[[0, 1, 3], :3])
+            with np.errstate(over="ignore"):
+                constants = self._rows[[0, 1, 3], 3] / lengths
+            self.eye = self._origin - np.linalg.solve(directions, constants)
         #: Unit vectors to the right and upwards in the image.
         self.right = _unit(self._rows[0, :3], self.forward)
         self.up = _unit(self._rows[1, :3], self.forward)
@@ -127,7 +142,8 @@ class RayView:
     def depth_of(self, ndc: _Doubles, level: int = 0) -> _Doubles:
         """View depth of the NDC depths of one level, in world units."""
         if self.is_parallel:
-            parallel: _Doubles = (ndc - self._rows[2, 3]) / self._slope
+            with np.errstate(over="ignore"):
+                parallel: _Doubles = (ndc - self._rows[2, 3]) / self._slope
             return parallel
         constant_of_w = self._rows[3, 3]
         slope = float(self._rows[2, :3] @ self.forward)
@@ -154,7 +170,7 @@ class RayView:
         """Whether NDC depth depends on the pixel besides view depth."""
         depth_row = self._rows[2, :3]
         rest = depth_row - (depth_row @ self.forward) * self.forward
-        return bool(np.linalg.norm(rest) > OBLIQUE * max(float(np.linalg.norm(depth_row)), 1.0))
+        return _length(rest) > OBLIQUE * max(_length(depth_row), 1.0)
 
     def clip_of(self, positions: _Doubles) -> _Doubles:
         """``(N, 4)``: clip coordinates of ``(N, 3)`` world positions, with w in world units."""
@@ -164,12 +180,14 @@ class RayView:
     def ray_lengths(self) -> _Doubles:
         """``(height, width)``: how far one goes along the ray of a pixel per unit of view depth."""
         x, y = self._middles(self.size, 0)
-        inverse = np.linalg.inv(self._rows[[0, 1, 3], :3])
-        squares = [
-            (inverse[axis, 0] * x + inverse[axis, 1] * y[:, None] + inverse[axis, 2]) ** 2
-            for axis in range(3)
-        ]
-        lengths: _Doubles = np.sqrt(squares[0] + squares[1] + squares[2])
+        directions, row_lengths = _directions(self._rows[[0, 1, 3], :3])
+        with np.errstate(over="ignore"):
+            inverse = np.linalg.inv(directions) / row_lengths
+            squares = [
+                (inverse[axis, 0] * x + inverse[axis, 1] * y[:, None] + inverse[axis, 2]) ** 2
+                for axis in range(3)
+            ]
+            lengths: _Doubles = np.sqrt(squares[0] + squares[1] + squares[2])
         return lengths
 
     def corners(self, reach: float) -> _Doubles:
@@ -177,20 +195,26 @@ class RayView:
 
         The four of the near plane come first: left bottom, right bottom, right top, left top.
         """
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._corners(reach)
+
+    def _corners(self, reach: float) -> _Doubles:
         x, y = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
         found = []
         for is_far in (False, True):
             ndc = float(is_far != self.reversed_z)
             if self.is_parallel:
-                matrix, right_side = self._rows[:3, :3], np.stack([x, y, np.full(4, ndc)])
-                offset = self._rows[:3, 3, None]
-                found.append(np.linalg.solve(matrix, right_side - offset).T + self._origin)
+                directions, lengths = _directions(self._rows[:3, :3])
+                right_side = np.stack([x, y, np.full(4, ndc)]) - self._rows[:3, 3, None]
+                places = np.linalg.solve(directions, right_side / lengths[:, None])
+                found.append(places.T + self._origin)
                 continue
             z = _inverse_w(self._rows, x, y, np.full(4, ndc))
             z = np.minimum(np.where(z > 0.0, z, np.inf), reach)
-            matrix = self._rows[[0, 1, 3], :3]
+            directions, lengths = _directions(self._rows[[0, 1, 3], :3])
+            right_side = np.stack([x * z, y * z, z]) / lengths[:, None]
             assert self.eye is not None
-            found.append(np.linalg.solve(matrix, np.stack([x * z, y * z, z])).T + self.eye)
+            found.append(np.linalg.solve(directions, right_side).T + self.eye)
         return np.concatenate(found)
 
     def _middles(self, shape: tuple[int, ...], level: int) -> tuple[_Doubles, _Doubles]:
@@ -205,14 +229,28 @@ class RayView:
 
 def _inverse_w(rows: _Doubles, x: _Doubles, y: _Doubles, ndc: _Doubles) -> _Doubles:
     """The clip w of points at places of the image, by the inverse of the matrix."""
-    a, b, c, d = np.linalg.inv(rows)[3]
-    reciprocal = a * x + b * y + c * ndc + d
-    with np.errstate(divide="ignore"):
+    whole, lengths = _directions(rows)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        a, b, c, d = np.linalg.inv(whole)[3] / lengths
+        reciprocal = a * x + b * y + c * ndc + d
         w: _Doubles = np.where(np.abs(reciprocal) < EXACT * abs(c), np.inf, 1.0 / reciprocal)
         return w
 
 
+def _length(row: _Doubles) -> float:
+    """The length of a vector, where the squares of its coordinates may overflow or vanish."""
+    greatest = float(np.abs(row).max())
+    return greatest * float(np.linalg.norm(row / greatest)) if greatest else 0.0
+
+
+def _directions(rows: _Doubles) -> tuple[_Doubles, _Doubles]:
+    """Rows that are not 0 as unit vectors, and their lengths."""
+    lengths = np.array([_length(row) for row in rows])
+    return rows / lengths[:, None], lengths
+
+
 def _unit(row: _Doubles, forward: _Doubles) -> _Doubles:
     """The part of `row` at right angles to `forward`, as a unit vector."""
+    row = row / _length(row)
     across: _Doubles = row - (row @ forward) * forward
     return across / np.linalg.norm(across)

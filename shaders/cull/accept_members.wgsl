@@ -1,30 +1,8 @@
-// The members of accepted groups, which are kept without a test: all of their group shows.
+// Keeps the members of accepted groups (`accept_run.wgsl`).
 // An invocation takes RUN members of one group, as in `cull_members.wgsl`.
+// Where a mask may begin full, `settle_groups.wgsl` takes the place of this.
 //
 // Tuning for software drivers, which skip no branch: it is a pass of its own.
-
-// Some instances are absent.
-override ABSENT: bool;
-
-fn is_absent(place: u32) -> bool {
-    return ABSENT && record_texel(place, 0u).x == ABSENT_CENTER_BITS;
-}
-
-// Bit k: member k of the run at place `first` is there and asked for.
-// A group with invalid bounds is never accepted.
-fn accept_run(first: u32) -> u32 {
-    var kept = 0u;
-    for (var k = 0u; k < RUN && first + k * SHARE < piece.count; k += 1u) {
-        let place = first + k * SHARE;
-        let is_kept = is_among(place) && !is_absent(place);
-        kept |= select(0u, 1u << k, is_kept);
-        if VERDICTS {
-            let verdict = select(OUTSIDE, UNOCCLUDED, is_kept);
-            atomicStore(&mask[verdicts_begin(piece.words) + place], verdict);
-        }
-    }
-    return kept;
-}
 
 @compute @workgroup_size(GROUP)
 fn accept_members(

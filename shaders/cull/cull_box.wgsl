@@ -6,8 +6,8 @@
 // The boxes that are not hidden are packed into a list, for the tests of what they hold:
 // `cull_children.wgsl` or `cull_members.wgsl`.
 //
-// Which groups can survive differs in the two passes of a frame: `groups_alone.wgsl`,
-// `groups_early.wgsl` and `groups_late.wgsl` have functions of the same names for it.
+// Which groups can survive differs in the early pass of a frame: `groups_alone.wgsl` and
+// `groups_early.wgsl` have functions of the same names for it.
 //
 // Source: Akenine-Moller, Haines and others, "Real-Time Rendering", section "Hierarchical
 // Z-Buffering".
@@ -16,6 +16,8 @@
 override TIER: u32;
 // The verdicts of groups are wanted, and the counts of what is tested.
 override VERDICTS: bool;
+// Which groups survive is wanted: the mask may begin full (`begin_mask.wgsl`).
+override FLIPS: bool;
 
 // Twin: `CULL_WORKGROUP` in `crates/hiz_core/src/instances/piece.rs`.
 const WORKGROUP: u32 = 128u;
@@ -33,7 +35,8 @@ struct Survivors {
     // Both are counted only where verdicts are wanted.
     tested: atomic<u32>,
     accepted: atomic<u32>,
-    padding: vec2<u32>,
+    is_full: u32,
+    padding: u32,
     // The arguments of the dispatch that accepts the members of groups, and how many groups.
     accept_workgroups: atomic<u32>,
     accept_workgroups_y: u32,
@@ -50,7 +53,8 @@ struct Survivors {
 
 // Writes a verdict that all groups of a box have.
 fn tell(box: u32, verdict: u32) {
-    if !VERDICTS {
+    // Where verdicts are not wanted, the words of groups that do not survive stay 0.
+    if !VERDICTS && (!FLIPS || verdict < VISIBLE) {
         return;
     }
     // The boxes of a survivor of an upper tier get verdicts of their own.
@@ -128,9 +132,5 @@ fn cull_box(box: u32, is_accepted: bool) {
     tell(box, select(VISIBLE, outcome.verdict, outcome.verdict < VISIBLE || is_shown(outcome)));
     if is_candidate(outcome) {
         survive(box, is_shown(outcome));
-    } else {
-        for (var group = first_group(box); group < end_group(box); group += 1u) {
-            forget(group);
-        }
     }
 }

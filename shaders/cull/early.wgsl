@@ -12,7 +12,7 @@ const WHOLE_RUN: u32 = (1u << RUN) - 1u;
 // Bit k: member k of the run at place `first` is a candidate.
 fn candidates(group: u32, share: u32, first: u32) -> u32 {
     if EARLY_SET == SET_BY_HISTORY {
-        return history[history_word(group, share)] & WHOLE_RUN;
+        return (history[history_word(group, share)] >> history_shift(share)) & WHOLE_RUN;
     }
     if EARLY_SET == SET_GIVEN {
         var found = 0u;

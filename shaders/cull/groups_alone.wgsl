@@ -1,4 +1,4 @@
-// The groups of a cull that is not one of two passes: all are tested, and none has a history.
+// The groups of a late pass, and of a cull that is not one of two passes: all are tested.
 
 fn has_candidates(group: u32) -> bool {
     return true;
@@ -8,5 +8,3 @@ fn has_candidates(group: u32) -> bool {
 fn is_candidate(outcome: Outcome) -> bool {
     return outcome.verdict >= VISIBLE;
 }
-
-fn forget(group: u32) {}

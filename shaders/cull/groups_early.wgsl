@@ -8,10 +8,8 @@ fn has_candidates(group: u32) -> bool {
         return true;
     }
     var any = 0u;
-    for (var share = 0u; share < SHARE; share += 1u) {
+    for (var share = 0u; share < SHARE; share += SHARES_OF_WORD) {
         any |= history[history_word(group, share)];
     }
     return any != 0u;
 }
-
-fn forget(group: u32) {}

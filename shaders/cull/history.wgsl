@@ -1,8 +1,9 @@
 // The history of the two passes of a frame: which instances the last late pass found visible.
 //
-// A word belongs to one invocation of a cull, and holds a bit for each of the RUN members that the
+// A byte belongs to one invocation of a cull, and holds a bit for each of the RUN members that the
 // invocation tests.
-// So a late pass writes whole words, without atomics, and every word in each frame.
+// A late pass begins with zeros, and sets the bits of what it keeps.
+// So it writes nothing about the groups that it rejects, which are most of them.
 // The words follow the stored order, which updates keep.
 // Twin: `crates/hiz_core/src/cull/history.rs`.
 
@@ -22,7 +23,16 @@ struct Frame {
     padding: vec2<u32>,
 }
 
-// The word of one of the SHARE invocations of a group.
+// How many of the SHARE invocations of a group have their bits in one word, and the group's words.
+const SHARES_OF_WORD: u32 = 32u / RUN;
+const WORDS_OF_GROUP: u32 = SHARE / SHARES_OF_WORD;
+
+// The word of one of the invocations of a group.
 fn history_word(group: u32, share: u32) -> u32 {
-    return HISTORY_BEGIN + group * SHARE + share;
+    return HISTORY_BEGIN + group * WORDS_OF_GROUP + share / SHARES_OF_WORD;
+}
+
+// Where its bits begin in that word.
+fn history_shift(share: u32) -> u32 {
+    return share % SHARES_OF_WORD * RUN;
 }

@@ -10,7 +10,9 @@ struct Parents {
     count: u32,
     tested: u32,
     accepted: u32,
-    padding: vec2<u32>,
+    // 1 where the mask began full (`begin_mask.wgsl`), 0 elsewhere.
+    is_full: u32,
+    padding: u32,
     accept_workgroups: u32,
     accept_workgroups_y: u32,
     accept_workgroups_z: u32,

@@ -10,6 +10,8 @@
 
 // Set the bit of each instance that is kept.
 override MASK: bool;
+// The mask may have begun full (`../cull/begin_mask.wgsl`).
+override FLIPS: bool;
 // Write its verdict.
 override VERDICTS: bool;
 
@@ -40,12 +42,17 @@ fn test(place: u32) -> bool {
     return outcome.verdict >= VISIBLE;
 }
 
-// Reports that the instance at a place is kept.
+// Reports that the instance at a place is kept; where FLIPS, that its bit is not as it began.
+// In each pass an instance is reported at most once.
 fn report(place: u32) {
     let index = caller_index(place);
     if MASK {
         let at = mask_place(index);
-        atomicOr(&mask[at.word], at.bit);
+        if FLIPS {
+            atomicXor(&mask[at.word], at.bit);
+        } else {
+            atomicOr(&mask[at.word], at.bit);
+        }
     }
     emit(place, index);
 }

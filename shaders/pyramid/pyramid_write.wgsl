@@ -34,7 +34,9 @@ fn first_block() -> vec2<u32> {
     return vec2<u32>(0u);
 }
 
-// Numbers the pyramid; one invocation of the first step calls this.
+// Numbers a pyramid of which a part is renewed; one invocation of the first step calls this.
+// A reduction of everything copies its number into the header instead (`steps.rs`).
+// A software driver, which skips no branch, would run this for all invocations.
 //
 // A part alone is not enough where the rest does not come from the reduction that was expected.
 // The number is 0 then, which no cull expects, until everything is renewed.

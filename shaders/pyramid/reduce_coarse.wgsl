@@ -35,7 +35,7 @@ fn ends_of(begin: vec2<u32>, side: u32) -> Ends {
 fn reduce_coarse(
     @builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32,
 ) {
-    if lane == 0u && group.x == 0u && group.y == 0u {
+    if REGION && lane == 0u && group.x == 0u && group.y == 0u {
         write_header();
     }
     let level = pyramid.levels[step.last];

@@ -6,6 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from hizvk.commands import pipes
+
 from .compare import print_tables
 from .pictures import draw
 from .scenes import SCENES
@@ -43,4 +45,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(pipes.run(main))

@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import sys
 
 import hizvk
+from hizvk.commands import pipes
 
 from . import __doc__ as about
 from . import cloud, driving, model
@@ -58,4 +60,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(pipes.run(main))

@@ -2,7 +2,9 @@
 
 import sys
 
+from hizvk.commands import pipes
+
 from .command import main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(pipes.run(main))

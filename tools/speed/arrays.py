@@ -13,6 +13,7 @@ import numpy as np
 import hizvk
 from hizvk.bounds import Points, Spheres
 
+from .numba_tests import MISSING, z_test
 from .rounds import in_turns
 
 if TYPE_CHECKING:
@@ -23,10 +24,8 @@ if TYPE_CHECKING:
 
     from .run import Run
 
-__all__ = ["MISSING", "measure", "numba_test"]
+__all__ = ["measure"]
 
-#: Why numba's ways may be missing.
-MISSING: Final = "numba is not installed (the dependency group dev has it)"
 #: World units of one step of the uint16 images.
 STEP: Final = 1.0 / 64.0
 
@@ -107,7 +106,7 @@ def _single(run: Run) -> None:
             run, lambda: hizvk.visible(spheres, camera, depth=image, kind=kind, device=device)
         ),
     }
-    test = numba_test()
+    test = z_test()
     if test is None:
         run.found.notes.append(f"left out: {MISSING}")
     else:
@@ -136,31 +135,3 @@ def _single(run: Run) -> None:
             ms["visible, spheres of radius 0"],
             ms["numba, points"],
         )
-
-
-def numba_test() -> Callable[[Any, Any, Any], Any] | None:
-    """A plain z-test of points by reversed depth, compiled; None without numba."""
-    try:
-        import numba
-    except ImportError:
-        return None
-
-    def test(points: Any, matrix: Any, depth: Any) -> Any:
-        height, width = depth.shape
-        kept = np.empty(len(points), np.bool_)
-        for i in range(len(points)):
-            x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            w = matrix[3, 0] * x + matrix[3, 1] * y + matrix[3, 2] * z + matrix[3, 3]
-            cx = matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]
-            cy = matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]
-            cz = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
-            seen = False
-            if w > 0.0 and abs(cx) <= w and abs(cy) <= w and 0.0 <= cz <= w:
-                column = min(int((cx / w * 0.5 + 0.5) * width), width - 1)
-                row = min(int((0.5 - cy / w * 0.5) * height), height - 1)
-                seen = cz >= depth[row, column] * w
-            kept[i] = seen
-        return kept
-
-    compiled: Callable[[Any, Any, Any], Any] = numba.njit(test)
-    return compiled

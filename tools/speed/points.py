@@ -1,6 +1,11 @@
 """Points on the device beside numba's and NumPy's tests, and the colours of a view beside NumPy's.
 
 All ways take the same points in float32, the same camera and the same depth image.
+
+numba has two tests: one reads the pixel that a point lies in, the other those within the guard, as
+the cull does.
+A cull and the second test also run several times in a row, as they do over many views.
+Alone, each begins with the caches as the way before has left them.
 """
 
 from __future__ import annotations
@@ -12,7 +17,7 @@ import numpy as np
 
 import hizvk
 
-from .arrays import MISSING, numba_test
+from .numba_tests import MISSING, guarded_test, z_test
 from .rounds import in_turns
 
 if TYPE_CHECKING:
@@ -24,8 +29,16 @@ __all__ = ["measure"]
 
 #: How many times as many points the larger cloud has.
 LARGER: Final = 4
-#: Against numba's z-test on one thread: at most a quarter of its time.
+#: Calls in a row.
+IN_A_ROW: Final = 8
+#: Against numba's tests on one thread: at most a quarter of their time.
 TARGET: Final = 0.25
+#: What a cull is compared with.
+OTHERS: Final = {
+    "numba": "numba's z-test on one thread",
+    "numba, with the guard": "numba's z-test with the guard",
+    "numpy": "NumPy's z-test",
+}
 
 
 def measure(run: Run) -> None:
@@ -53,31 +66,47 @@ def _clouds(run: Run, key: str, count: int) -> None:
     def colours() -> object:
         return hizvk.colour_points(points, [(camera, depth, picture)], device=device)
 
-    ways: dict[str, Callable[[], object]] = {
-        "points, resident": resident,
-        "points, uploaded and coloured": colours,
-        "numpy": lambda: _numpy_test(positions, camera, image),
-        "numpy, project and gather": lambda: _numpy_colours(positions, camera, picture),
+    ways: dict[str, Callable[[], float]] = {
+        "points, resident": _timed(run, resident),
+        "points, resident, in a row": _timed(run, resident, IN_A_ROW),
+        "points, uploaded and coloured": _timed(run, colours),
+        "numpy": _timed(run, lambda: _numpy_test(positions, camera, image)),
+        "numpy, project and gather": _timed(
+            run, lambda: _numpy_colours(positions, camera, picture)
+        ),
     }
-    test = numba_test()
-    if test is None:
+    plain, guarded = z_test(), guarded_test()
+    if plain is None or guarded is None:
         run.found.notes.append(f"left out: {MISSING}")
     else:
         matrix = camera.clip_from_world
-        ways["numba"] = lambda: test(positions, matrix, image)
+        ways["numba"] = _timed(run, lambda: plain(positions, matrix, image))
+
+        def with_guard() -> object:
+            return guarded(positions, matrix, image)
+
+        ways["numba, with the guard"] = _timed(run, with_guard)
+        ways["numba, with the guard, in a row"] = _timed(run, with_guard, IN_A_ROW)
     rounds = max(3, run.extent.rounds // 3)
-    ms = in_turns({name: _timed(run, way) for name, way in ways.items()}, rounds)
+    ms = in_turns(ways, rounds)
     run.found.timed(f"points, {count:,}", ms)
-    others = {"numpy": "NumPy's z-test"}
-    if test is not None:
-        others = {"numba": "numba's z-test on one thread", **others}
-    for way, said in others.items():
+    one_cull = f"cull of {count:,} resident points, mask read"
+    for way, said in OTHERS.items():
+        if way in ms:
+            run.found.ratio(
+                f"points.{way}.{key}",
+                f"{one_cull} / {said}",
+                ms["points, resident"],
+                ms[way],
+                None if way == "numpy" else TARGET,
+            )
+    if guarded is not None:
         run.found.ratio(
-            f"points.{way}.{key}",
-            f"cull of {count:,} resident points, mask read / {said}",
-            ms["points, resident"],
-            ms[way],
-            TARGET if way == "numba" else None,
+            f"points.row.{key}",
+            f"{one_cull} / {OTHERS['numba, with the guard']}, {IN_A_ROW} in a row",
+            ms["points, resident, in a row"],
+            ms["numba, with the guard, in a row"],
+            TARGET,
         )
     run.found.ratio(
         f"points.colours.{key}",
@@ -101,11 +130,14 @@ def _numpy_colours(positions: Any, camera: hizvk.Camera, picture: Any) -> Any:
     return hizvk.gather(picture, camera.project(positions).pixels)
 
 
-def _timed(run: Run, work: Callable[[], object]) -> Callable[[], float]:
+def _timed(run: Run, work: Callable[[], object], times: int = 1) -> Callable[[], float]:
+    """Milliseconds of one call among `times` in a row."""
+
     def timed() -> float:
         run.device.wait()
         start = time.perf_counter()
-        work()
-        return 1e3 * (time.perf_counter() - start)
+        for _ in range(times):
+            work()
+        return 1e3 * (time.perf_counter() - start) / times
 
     return timed

@@ -5,7 +5,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{Random, camera_along_z, engine, ndc};
+use common::{Random, camera_along_z, engine, ndc, words_of};
 use hiz_core::headless::Culling;
 use hiz_core::{
     Bounds, Camera, Coverage, CullOptions, DepthConvention, DrawIndexedIndirect, DrawTemplate,
@@ -85,26 +85,10 @@ fn statistics_say_which_level_was_read() {
 fn raw_lists(culling: &Culling) -> Vec<Vec<u32>> {
     culling.wait().unwrap();
     (0..culling.visible().num_pieces())
-        .map(|piece| words_of(culling.visible().list(piece).expect("indices were asked for")))
+        .map(|piece| {
+            words_of(&engine(), culling.visible().list(piece).expect("indices were asked for"))
+        })
         .collect()
-}
-
-fn words_of(buffer: &wgpu::Buffer) -> Vec<u32> {
-    let engine = engine();
-    let (device, queue) = (engine.device(), engine.queue());
-    let staging = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("test.staging"),
-        size: buffer.size(),
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
-    queue.submit([encoder.finish()]);
-    staging.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
-    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
-    let view = staging.get_mapped_range(..).unwrap();
-    view.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect()
 }
 
 /// Buffers that a renderer uses frame after frame hold the last result and nothing of earlier ones.
@@ -132,19 +116,20 @@ fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
                 .record_cull(&mut encoder, &instances, &camera, pyramid, &visible, &options)
                 .unwrap();
             engine().queue().submit([encoder.finish()]);
-            let draws = words_of(visible.draw_arguments().unwrap());
+            let draws = words_of(&engine(), visible.draw_arguments().unwrap());
             let (mut bits, mut indices) = (Vec::new(), Vec::new());
             for piece in 0..visible.num_pieces() {
                 let first = 1024 * piece as u32;
                 let here = (3000 - first).min(1024);
-                let mask = words_of(visible.mask(piece).unwrap());
+                let mask = words_of(&engine(), visible.mask(piece).unwrap());
                 bits.extend(
                     (0..here)
                         .filter(|i| mask[*i as usize / 32] >> (i % 32) & 1 == 1)
                         .map(|i| first + i),
                 );
                 let count = draws[(visible.draw_offset(piece) / 4) as usize + 1] as usize;
-                indices.extend_from_slice(&words_of(visible.list(piece).unwrap())[..count]);
+                indices
+                    .extend_from_slice(&words_of(&engine(), visible.list(piece).unwrap())[..count]);
             }
             indices.sort_unstable();
             assert_eq!(indices, bits, "{order:?} {hierarchy:?}");

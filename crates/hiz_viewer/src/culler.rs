@@ -76,6 +76,12 @@ pub(crate) fn depth_slack(adapter: &wgpu::AdapterInfo) -> f64 {
     if adapter.name.contains("SwiftShader") { 2e-3 } else { 1e-2 }
 }
 
+/// [`depth_slack`] as users read it.
+pub(crate) fn slack_in_words(adapter: &wgpu::AdapterInfo) -> String {
+    let slack = depth_slack(adapter);
+    format!("depth slack: {slack}, the share by which bodies may be drawn nearer than their bounds")
+}
+
 /// What the library keeps between frames.
 #[derive(Debug)]
 pub(crate) struct Culler {

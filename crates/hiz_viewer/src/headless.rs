@@ -21,7 +21,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| format!("--out: {}: {error}", arguments.out.display()))?;
     let gpu = Gpu::open(&instance(IndirectChecks::On), None)?;
     println!("adapter: {}", gpu.words());
-    println!("depth slack: {}", crate::culler::depth_slack(&gpu.adapter));
+    println!("{}", crate::culler::slack_in_words(&gpu.adapter));
     crate::sample_places::tell(&gpu, arguments.samples)?;
     let mut renderer = Renderer::new(gpu, scene, arguments.size, arguments.samples)?;
     renderer.mode = arguments.mode;

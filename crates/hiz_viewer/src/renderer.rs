@@ -327,7 +327,7 @@ impl Renderer {
     pub(crate) fn lines(&self) -> Vec<String> {
         let Counts { bodies, drawn: [early, late], triangles, milliseconds } = self.counts;
         let drawn = match self.mode {
-            Mode::TwoPasses => format!("{early} + {late}"),
+            Mode::TwoPasses => format!("{early} early + {late} late"),
             _ => early.to_string(),
         };
         let ImageSize { width, height } = self.targets.size;
@@ -366,6 +366,6 @@ fn stages_in_words(times: &StageTimesInFlight) -> Result<String, Failure> {
         .collect();
     Ok(match known {
         Some(known) if !known.is_empty() => format!("stages in ms: {}", known.join(", ")),
-        _ => "stages: wall time alone, as no timestamps of this device can be trusted".to_owned(),
+        _ => "stages: wall time alone (no timestamps to trust)".to_owned(),
     })
 }

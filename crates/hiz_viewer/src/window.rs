@@ -87,7 +87,7 @@ impl Open {
         let surface = instance.create_surface(Arc::clone(&window))?;
         let gpu = Gpu::open(&instance, Some(&surface))?;
         println!("adapter: {}", gpu.words());
-        println!("depth slack: {}", crate::culler::depth_slack(&gpu.adapter));
+        println!("{}", crate::culler::slack_in_words(&gpu.adapter));
         crate::sample_places::tell(&gpu, arguments.samples)?;
         let formats = surface.get_capabilities(&gpu.adapter_handle).formats;
         // Colours are stored as they are computed, so the window must not convert them.
@@ -209,7 +209,11 @@ impl Viewer<'_> {
     }
 
     fn handle(&mut self, events: &ActiveEventLoop, event: WindowEvent) -> Result<(), Failure> {
-        if let WindowEvent::KeyboardInput { event, .. } = &event {
+        if let WindowEvent::KeyboardInput { event, is_synthetic, .. } = &event {
+            // When the window gets the keyboard, keys that are held come once more.
+            if *is_synthetic {
+                return Ok(());
+            }
             if event.logical_key == Pressed::Named(NamedKey::Escape) {
                 events.exit();
             }
@@ -261,10 +265,17 @@ fn shot_path(folder: &Path, number: usize, key: Key) -> PathBuf {
 }
 
 /// What a pressed key does; `None` for other keys, and when one is let go.
+/// A key that is held moves on; switches switch once.
 fn key_of(event: &KeyEvent) -> Option<Key> {
     if event.state == ElementState::Released {
         return None;
     }
+    let key = pressed(event)?;
+    let moves = matches!(key, Key::Forward | Key::Back | Key::Left | Key::Right);
+    (moves || !event.repeat).then_some(key)
+}
+
+fn pressed(event: &KeyEvent) -> Option<Key> {
     match &event.logical_key {
         Pressed::Named(NamedKey::ArrowUp) => Some(Key::Forward),
         Pressed::Named(NamedKey::ArrowDown) => Some(Key::Back),

@@ -153,10 +153,12 @@ fn differing(a: &[u8], b: &[u8]) -> f64 {
     pixels.filter(|(p, q)| p != q).count() as f64 / (SIZE[0] * SIZE[1]) as f64
 }
 
-/// The number of drawn bodies in a line: `drawn 12 + 3 of 400`.
+/// The number of drawn bodies in a line: `drawn 12 early + 3 late of 400`.
 fn drawn(line: &str) -> u32 {
     let words = line.split("drawn ").nth(1).and_then(|rest| rest.split(" of ").next());
-    words.expect("a line with counts").split('+').map(|n| n.trim().parse::<u32>().unwrap()).sum()
+    let numbers =
+        words.expect("a line with counts").split(' ').filter_map(|n| n.parse::<u32>().ok());
+    numbers.sum()
 }
 
 #[test]
@@ -184,6 +186,16 @@ fn keys_change_what_the_window_shows() {
     let darker = differing(&all, &dark);
     assert!(darker > 0.02, "in vain without culling: {darker}");
     viewer.press("v");
+    viewer.press("c");
+
+    // A key that is held switches once.
+    viewer.xdotool(&["keydown", "c"]);
+    std::thread::sleep(Duration::from_millis(1500));
+    viewer.xdotool(&["keyup", "c"]);
+    viewer.xdotool(&["key", "p"]);
+    viewer.line_with("_C.png");
+    let next = viewer.line_with(".png");
+    assert!(next.contains("_P.png"), "{next}");
     viewer.press("c");
 
     // Boxes: red and white pixels that were not there.

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ..bounds import Boxes
-from ..commands import figure, page
+from ..commands import figure, page, pipes
 from ..device import Device
 from ..explanation import Verdict
 from ..scenes import mountains
@@ -173,4 +173,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(pipes.run(main))

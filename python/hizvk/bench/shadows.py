@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .._arguments import Size
+    from ..progress import Progress
     from ..scenes.sunlit import Sunlit, SunView
 
     _Floats = npt.NDArray[np.float64]
@@ -241,11 +242,12 @@ def run(
     hizvk.HizError
         What the device refuses.
     """
-    started = time.perf_counter()
-    out.mkdir(parents=True, exist_ok=True)
     found = Report(command, SEED, hizvk.Device().adapter, descent=descent)
-    found.rows = measure(size, small=small, descent=descent)
-    found.seconds = time.perf_counter() - started
+
+    def town(_key: str, _steps: Progress) -> None:
+        found.rows = measure(size, small=small, descent=descent)
+
+    found.over(out, ("town",), town, prog=PROG)
     report.write(out, found.as_data(), found.page())
     return found
 

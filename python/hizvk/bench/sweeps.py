@@ -22,7 +22,7 @@ import numpy as np
 
 import hizvk
 
-from ..commands import page
+from ..commands import page, pipes
 from ..scenes.city import city
 
 if TYPE_CHECKING:
@@ -125,4 +125,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(pipes.run(main))

@@ -18,6 +18,7 @@ from ..bounds import as_arrays
 from ..camera import Camera
 from ..drawing import limit
 from ..explanation import Verdict
+from ..other_cameras import other_camera
 from ..resources import Occluders
 
 if TYPE_CHECKING:
@@ -296,7 +297,7 @@ def culled(
     if maps.device is not device:
         raise ValueError("maps: expected an OcclusionMap of this device, got one of another Device")
     if camera.resized(maps.size) != maps.camera:
-        raise ValueError(f"camera: expected the view of the maps, {maps.camera!r}, got {camera!r}")
+        raise other_camera("camera", "the view of the maps", maps.camera, camera.resized(maps.size))
     negligible = _negligible(negligible_px)
     never = None
     if copies is not None:

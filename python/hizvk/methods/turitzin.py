@@ -196,4 +196,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    from ..commands import pipes
+
+    sys.exit(pipes.run(main))

@@ -202,12 +202,12 @@ def recommend(
     >>> found.best.cull(crowd, camera, walls).mask.tolist()
     [True, False]
     """
+    options = cull_options(options, keywords, recommend)
     alternatives = alternatives_of(bounds)
     views = cameras_of(cameras)
     if (occluders is None) == (depths is None):
         got = "neither" if occluders is None else "both"
         raise TypeError(f"occluders, depths: expected exactly one of them, got {got}")
-    options = cull_options(options, keywords)
     coverage = options.coverage
     if max_ms is not None:
         max_ms = _arguments.number("max_ms", max_ms, above=0.0)

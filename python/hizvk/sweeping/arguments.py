@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
+import sys
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ProcessPoolExecutor
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -26,6 +29,7 @@ __all__ = [
     "executor_of",
     "groups_of",
     "meaning_of",
+    "refuse_unsendable",
     "refuse_uploaded",
     "render_of",
     "resumed",
@@ -160,6 +164,33 @@ def executor_of(executor: Any) -> tuple[Executor | int | None, Any]:
         "executor: expected None, a number of processes, a concurrent.futures.Executor or a Dask "
         f"Client, got {_arguments.describe(executor)}"
     )
+
+
+def refuse_unsendable(depths: Any, runner: Executor | int | None) -> None:
+    """Refuses a function that other processes cannot look up; engines with ways of their own can.
+
+    Processes look a function up by the name of its module and its own.
+    """
+    if not callable(depths) or not isinstance(runner, (int, ProcessPoolExecutor)):
+        return
+    expected = (
+        "a function on the top level of a module that other processes can import, or an instance "
+        "of a class there"
+    )
+    way = (
+        "pass such a function, a list of arrays, or threads: "
+        "concurrent.futures.ThreadPoolExecutor(n) as executor"
+    )
+    try:
+        pickle.dumps(depths)
+    except Exception as error:  # whatever the object's own way of pickling raises
+        got = f"{_arguments.describe(depths)} ({error})"
+        raise TypeError(f"depths: expected {expected}, got {got}; {way}") from None
+    # A notebook's has no file, and that of a script on stdin is none.
+    is_interactive = not Path(getattr(sys.modules["__main__"], "__file__", "<>")).is_file()
+    if is_interactive and getattr(depths, "__module__", "") == "__main__":
+        got = f"{_arguments.describe(depths)} of an interactive session"
+        raise TypeError(f"depths: expected {expected}, got {got}; {way}")
 
 
 def adapter_of(adapter: Any) -> str | int | None:

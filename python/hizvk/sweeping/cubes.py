@@ -25,6 +25,7 @@ FACES: Final = (
 )
 
 
+@_arguments.explained()
 def cube(
     eye: npt.ArrayLike,
     *,

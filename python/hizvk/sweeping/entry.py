@@ -103,8 +103,8 @@ def sweep(
     depths : sequence of V arrays, or function
         Instead of `occluders`: the depth image of each view.
         A function takes the number of a view and returns its array.
-        It runs where the block runs, so it can load a file there; other processes need one that can
-        be pickled.
+        It runs where the block runs, so it can load a file there.
+        Other processes need one of a module that they can import, no lambda.
     kind, scale, invalid, tolerance
         What the numbers of `depths` are, as in `Device.pyramid`.
     cull : "none", "back" or "front"
@@ -161,6 +161,7 @@ def sweep(
     >>> seen, seen.union().tolist()
     (<Sweep: 6 views of 2 instances>, [False, True])
     """
+    chosen = cull_options(options, keywords, sweep)
     arguments.refuse_uploaded(bounds, occluders)
     as_arrays("bounds", bounds)
     views = arguments.cameras_of(cameras)
@@ -174,8 +175,8 @@ def sweep(
     faces: Any = _arguments.choice("cull", cull, words(FaceCull))
     rows = arguments.groups_of(groups, len(views))
     runner, engine = arguments.executor_of(executor)
+    arguments.refuse_unsendable(depths, runner)
     per_block = arguments.block_of(block, len(views))
-    chosen = cull_options(options, keywords)
     if chosen.shadow is not None:
         got = _arguments.describe(chosen.shadow)
         raise ValueError(f"shadow: expected None in a sweep, got {got}")

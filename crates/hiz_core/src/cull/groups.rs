@@ -3,6 +3,7 @@
 //! In large pieces upper tiers of boxes go first, from the topmost one down.
 //! Each tier's survivors are the arguments of an indirect dispatch, which tests what they hold.
 
+use crate::cull::full_mask::FullMask;
 use crate::cull::options::{CullOptions, Hierarchy};
 use crate::cull::pipelines::{
     CullKey, FramePass, MEMBER_BINDINGS, ReportKey, accept_members_pipeline, cull_boxes_pipeline,
@@ -79,6 +80,8 @@ pub(super) struct GroupCull<'a> {
     members: wgpu::ComputePipeline,
     /// What keeps the members of accepted groups; `None` where no group can be accepted.
     accept: Option<wgpu::ComputePipeline>,
+    /// The passes of a mask that may begin full, in place of `accept`.
+    full: Option<FullMask>,
 }
 
 /// The tests of the boxes of a tier.
@@ -148,11 +151,13 @@ impl<'a> GroupCull<'a> {
                 })
             });
         let tiers = boxes.collect::<Result<_>>()?;
-        let accepts = key.nearest && !key.sample_coverage;
+        let flips = report.flips();
+        let accepts = key.nearest && !key.sample_coverage && !flips;
         Ok(Self {
             tiers,
             members: cull_members_pipeline(gpu, &key.of_instances(&report), &report)?,
             accept: accepts.then(|| accept_members_pipeline(gpu, &key, &report)).transpose()?,
+            full: flips.then(|| FullMask::new(gpu, (&key, &report), output)).transpose()?,
         })
     }
 
@@ -182,14 +187,31 @@ impl<'a> GroupCull<'a> {
         }
     }
 
-    pub(super) fn record_members(&self, pass: &mut wgpu::ComputePass<'_>) {
+    /// Records the tests of members.
+    ///
+    /// The piece's records and outputs are bound; `view`: what tests of instances bind besides.
+    /// `words`: those of the piece's mask, or 0 if nothing is to run.
+    pub(super) fn record_members(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        view: &wgpu::BindGroup,
+        words: u32,
+    ) {
         let groups = &self.tiers[0];
+        if let Some(full) = &self.full {
+            full.record_begin(pass, words);
+        }
+        pass.set_bind_group(0, view, &[]);
         pass.set_bind_group(3, &groups.list, &[]);
         pass.set_pipeline(&self.members);
         pass.dispatch_workgroups_indirect(&groups.output.survivors, 0);
         if let Some(accept) = &self.accept {
             pass.set_pipeline(accept);
-            pass.dispatch_workgroups_indirect(&groups.output.survivors, ACCEPT_OFFSET);
+        } else if let Some(full) = &self.full {
+            full.set_settle(pass);
+        } else {
+            return;
         }
+        pass.dispatch_workgroups_indirect(&groups.output.survivors, ACCEPT_OFFSET);
     }
 }

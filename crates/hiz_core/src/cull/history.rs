@@ -9,7 +9,7 @@
 //! - What counts as drawn is the early pass's mask after the capacity of its list was applied.
 //! - It counts in its own frame alone: early passes are numbered, the device keeps the number of
 //!   the last one that ran, and a late pass that finds another number takes nothing as drawn.
-//! - A late pass writes every word of the history, also those of groups that it rejects.
+//! - A late pass clears the whole history before it notes what it keeps.
 
 use std::sync::OnceLock;
 
@@ -103,7 +103,6 @@ pub(super) struct History {
     pub(super) early: KeptBindings<wgpu::Buffer>,
     /// One per tier of boxes.
     pub(super) early_groups: [OnceLock<wgpu::BindGroup>; TIERS],
-    pub(super) late_groups: [[OnceLock<wgpu::BindGroup>; 2]; TIERS],
     /// What late passes bind, without and with the count of levels.
     pub(super) late: [OnceLock<wgpu::BindGroup>; 2],
     pub(super) cut: OnceLock<wgpu::BindGroup>,
@@ -187,15 +186,15 @@ impl Temporal {
         self.state.lock().tested = None;
     }
 
-    /// Bytes on the device: those of [`Temporal::early`] and [`Temporal::late`], and half a byte
-    /// per instance.
+    /// Bytes on the device: those of [`Temporal::early`] and [`Temporal::late`], and a bit per
+    /// instance.
     pub fn device_bytes(&self) -> u64 {
         let histories = self.pieces.iter().map(|piece| piece.words.size()).sum::<u64>();
         self.early.device_bytes() + self.late.device_bytes() + histories
     }
 
     /// The history of a piece, for tests that overwrite it.
-    /// From word 4 on, bit k of word `8 g + s` is the place `64 g + s + 8 k`.
+    /// From word 4 on, bit k of byte `8 g + s` is the place `64 g + s + 8 k`.
     #[cfg(feature = "testing")]
     pub fn history(&self, piece: usize) -> &wgpu::Buffer {
         &self.pieces[piece].words
@@ -295,12 +294,11 @@ impl History {
     fn new(gpu: &Gpu, piece: &Piece) -> Result<Self> {
         // A workgroup of a flat cull takes so many groups, whether there are as many or not.
         let groups = piece.groups().max(1).next_multiple_of(GROUPS_OF_RUN);
-        let words = HISTORY_BEGIN + groups * (GROUP as u32 / GROUPS_OF_RUN);
+        let words = HISTORY_BEGIN + groups * (GROUP as u32 / u32::BITS);
         Ok(Self {
             words: gpu.empty("hiz.temporal.history", 4 * u64::from(words), STORAGE)?,
             early: KeptBindings::new(GIVEN_KEPT),
             early_groups: Default::default(),
-            late_groups: Default::default(),
             late: Default::default(),
             cut: OnceLock::new(),
         })

@@ -2,7 +2,7 @@
 
 use crate::cull::early::check_order;
 use crate::cull::groups::{NO_STATISTICS, bind_survivors, tiers_of};
-use crate::cull::history::{FrameUniform, Temporal};
+use crate::cull::history::{FrameUniform, HISTORY_BEGIN, Temporal};
 use crate::cull::inputs::{CullInputs, check_contexts};
 use crate::cull::options::{Coverage, CullOptions};
 use crate::cull::pipelines::{FramePass, cull_pipeline};
@@ -40,6 +40,9 @@ pub(crate) fn record_late(
         record_against_pyramid(gpu, encoder, inputs, &target, cull_pipeline, |encoder| {
             let size = size_of::<FrameUniform>() as u64;
             numbers.record(encoder, &[Copy { from: 0, target: &temporal.frame, to: 0, size }]);
+            for history in &temporal.pieces {
+                encoder.clear_buffer(&history.words, 4 * u64::from(HISTORY_BEGIN), None);
+            }
             record_copies(encoder, instances, temporal);
         })
     })?;
@@ -116,10 +119,9 @@ fn target<'a>(gpu: &Gpu, inputs: &CullInputs<'_>, temporal: &'a Temporal) -> Res
             )
         })?;
         let bind_tier = |tier: usize| {
-            let output = output.groups_or_new(gpu, piece)?;
-            let more = [entry(4, history.words.as_entire_binding())];
-            let bind = || bind_survivors(gpu, (output, tier), statistics, report.pass, &more);
-            made(&history.late_groups[tier][way], bind).cloned()
+            let groups = output.groups_or_new(gpu, piece)?;
+            let bind = || bind_survivors(gpu, (groups, tier), statistics, report.pass, &[]);
+            made(&groups.tiers[tier].bindings[way], bind).cloned()
         };
         let groups = (0..tiers_of(piece, options)).map(bind_tier).collect::<Result<_>>()?;
         Ok((outputs.clone(), groups))

@@ -8,6 +8,7 @@
 //!    `lod` adds those that choose levels of detail.
 //! 3. `pipelines` picks the pipeline that fits the options.
 //! 4. `record` records the pass; `groups` adds the test of whole groups before their members.
+//!    `full_mask` has masks of which only what is culled is written.
 //!    `among` restricts it to some of the instances, and `views` culls for several cameras.
 //! 5. `history`, `early` and `late` are the two passes of a frame: the early one draws what was
 //!    visible before, and the late one tests all against the depth of that.
@@ -27,6 +28,7 @@ pub(crate) mod count;
 pub(crate) mod early;
 #[cfg(feature = "headless")]
 pub(crate) mod explain;
+pub(crate) mod full_mask;
 pub(crate) mod groups;
 pub(crate) mod history;
 pub(crate) mod inputs;

@@ -111,6 +111,16 @@ pub(crate) struct ReportKey {
     pub(crate) pass: FramePass,
 }
 
+impl ReportKey {
+    /// Whether the mask may begin full where groups are culled first (`full_mask.rs`).
+    ///
+    /// Each instance is then reported by its bit alone, whether it is kept or culled.
+    pub(super) fn flips(&self) -> bool {
+        let emits = !matches!(self.emit, EmitKey::List { append: false, .. });
+        self.mask && self.pass == FramePass::Alone && !emits
+    }
+}
+
 /// Which cull of a frame this is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum FramePass {
@@ -146,11 +156,10 @@ impl FramePass {
     /// The files that say which groups survive.
     fn group_files(self) -> &'static [File] {
         match self {
-            Self::Alone => &[wgsl!("cull/groups_alone")],
+            Self::Alone | Self::Late => &[wgsl!("cull/groups_alone")],
             Self::Early(_) => {
                 &[wgsl!("cull/history"), wgsl!("cull/candidates"), wgsl!("cull/groups_early")]
             }
-            Self::Late => &[wgsl!("cull/history"), wgsl!("cull/groups_late")],
         }
     }
 
@@ -166,9 +175,8 @@ impl FramePass {
     /// What a cull of groups writes, and what it reads of its frame.
     pub(super) fn group_bindings(self) -> &'static [(u32, Binding)] {
         match self {
-            Self::Alone => SURVIVOR_BINDINGS,
+            Self::Alone | Self::Late => SURVIVOR_BINDINGS,
             Self::Early(_) => EARLY_SURVIVOR_BINDINGS,
-            Self::Late => LATE_SURVIVOR_BINDINGS,
         }
     }
 
@@ -308,6 +316,7 @@ pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
     let mut constants = vec![
         ("MASK", flag(key.mask)),
         ("VERDICTS", flag(key.verdicts)),
+        ("FLIPS", flag(key.flips())),
         ("STATISTICS", flag(key.statistics)),
     ];
     constants.extend(key.emit.constants());
@@ -405,15 +414,6 @@ const EARLY_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
     (5, Binding::Uniform),
 ];
 
-/// The bindings of a late pass's groups: as [`SURVIVOR_BINDINGS`], then the history.
-const LATE_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
-    (0, Binding::Write),
-    (1, Binding::Write),
-    (2, Binding::WriteTexels),
-    (3, Binding::Write),
-    (4, Binding::Write),
-];
-
 /// The bindings of the survivors, which tests of what they hold read.
 pub(crate) const MEMBER_BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Read), (1, Binding::ReadTexels)];
@@ -488,7 +488,8 @@ pub(crate) fn flat_files(emit: EmitKey, pass: FramePass) -> Vec<File> {
         wgsl!("output/statistics"),
         wgsl!("output/report"),
     ];
-    [&shared[..], &emit.files(), pass.member_files(), &[wgsl!("cull/cull")]].concat()
+    let last = [wgsl!("cull/not_flipped"), wgsl!("cull/cull")];
+    [&shared[..], &emit.files(), pass.member_files(), &last].concat()
 }
 
 /// The shader of the flat cull, for instances of one kind.
@@ -525,7 +526,7 @@ pub(crate) fn cull_members_module(
     decision: Decision,
     (emit, pass): (EmitKey, FramePass),
 ) -> Source {
-    members_module((store, kind, decision), emit, pass, wgsl!("cull/cull_members"))
+    members_module((store, kind, decision), emit, pass, &[wgsl!("cull/cull_members")])
 }
 
 /// The shader that keeps the members of accepted groups.
@@ -535,14 +536,21 @@ pub(crate) fn accept_members_module(
     emit: EmitKey,
     pass: FramePass,
 ) -> Source {
-    members_module((store, kind, Decision::Seen), emit, pass, wgsl!("cull/accept_members"))
+    let entry = [wgsl!("cull/accept_run"), wgsl!("cull/accept_members")];
+    members_module((store, kind, Decision::Seen), emit, pass, &entry)
+}
+
+/// The shader that settles the members of whole groups, where a mask may begin full.
+pub(crate) fn settle_groups_module(store: DepthStore, kind: BoundsKind, emit: EmitKey) -> Source {
+    let entry = [wgsl!("cull/accept_run"), wgsl!("cull/settle_groups")];
+    members_module((store, kind, Decision::Seen), emit, FramePass::Alone, &entry)
 }
 
 fn members_module(
     (store, kind, decision): (DepthStore, BoundsKind, Decision),
     emit: EmitKey,
     pass: FramePass,
-    entry: File,
+    entry: &[File],
 ) -> Source {
     let shared = [
         wgsl!("instances/piece"),
@@ -550,8 +558,8 @@ fn members_module(
         wgsl!("output/report"),
         wgsl!("instances/groups"),
     ];
-    let last = [wgsl!("cull/parents"), entry];
-    let files = [&shared[..], &emit.files(), pass.member_files(), &last].concat();
+    let last = [wgsl!("cull/parents"), wgsl!("cull/flipped")];
+    let files = [&shared[..], &emit.files(), pass.member_files(), &last, entry].concat();
     unexplained(store, kind, decision, &files)
 }
 
@@ -608,6 +616,7 @@ pub(crate) fn cull_boxes_pipeline(
     let mut constants = classify_constants(key).to_vec();
     constants.push(("TIER", f64::from(tier)));
     constants.push(("VERDICTS", flag(report.verdicts)));
+    constants.push(("FLIPS", flag(report.flips())));
     constants.push(("STATISTICS", flag(report.statistics)));
     constants.extend(report.pass.constant());
     let written = ("hiz.cull_groups.layout", report.pass.group_bindings());

@@ -332,6 +332,9 @@ impl<'a> Target<'a> {
                 let to = &output.groups_or_new(gpu, piece)?.tiers[tier].survivors;
                 encoder.copy_buffer_to_buffer(&from, 0, to, 0, from.size());
             }
+            if report.flips() && !report.verdicts && !target.groups.is_empty() {
+                encoder.clear_buffer(&output.groups_or_new(gpu, piece)?.verdicts, 0, None);
+            }
         }
         Ok(())
     }
@@ -399,13 +402,13 @@ impl<'a> Tests<'a> {
             }
             let stage = if groups.is_some() { "cull members" } else { "cull" };
             passes.record(stage, |pass| {
-                pass.set_bind_group(0, view, &[]);
                 pass.set_bind_group(1, &target.records, &[]);
                 pass.set_bind_group(2, &target.outputs, &[]);
                 if let Some(groups) = groups {
-                    groups.record_members(pass);
+                    groups.record_members(pass, view, workgroups(piece.words()));
                 } else if let Some(flat) = &self.flat {
                     let count = workgroups(piece.groups().div_ceil(GROUPS_OF_RUN));
+                    pass.set_bind_group(0, view, &[]);
                     pass.set_pipeline(flat);
                     pass.dispatch_workgroups(count, 1, 1);
                 }

@@ -7,6 +7,8 @@ pub(crate) mod curve;
 pub(crate) mod inverse;
 pub(crate) mod linear;
 pub(crate) mod memory;
+#[cfg(test)]
+pub(crate) mod random;
 pub(crate) mod rounding;
 pub(crate) mod threads;
 pub(crate) mod vectors;

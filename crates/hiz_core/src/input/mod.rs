@@ -9,6 +9,7 @@ pub(crate) mod camera;
 pub(crate) mod depth;
 pub(crate) mod depth_kind;
 pub(crate) mod depth_numbers;
+mod discs;
 pub(crate) mod far_pixels;
 pub(crate) mod image;
 mod lens;

@@ -523,6 +523,8 @@ fn toward_zero(v: f64) -> f64 {
 }
 
 #[cfg(test)]
+mod margins;
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::input::camera::Camera;

@@ -8,6 +8,7 @@ use crate::host::linear::Vec3;
 use crate::host::threads::{on_threads, worth_it};
 use crate::input::bounds::Floats;
 use crate::input::camera::Camera;
+use crate::input::discs::{Disc, draw_discs};
 use crate::input::image::ImageSize;
 use crate::input::lens::toward_far;
 
@@ -244,39 +245,18 @@ pub fn depth_of_points(
             format!("expected three numbers per point, got {}", positions.len()),
         ));
     }
-    let (size, reversed) = (camera.size(), camera.convention().is_reversed());
+    let size = camera.size();
     let projector = Projector::new(camera);
     let per_radius = pixels_per_unit(&projector);
-    let (width, height) = (size.width as usize, size.height as usize);
-    let mut image = vec![camera.convention().far(); width * height];
-    for i in 0..positions.len() / 3 {
-        let Some(p) = projector.project(positions.array(i)) else { continue };
-        if !(0.0..=1.0).contains(&p.depth) {
-            continue;
-        }
-        let depth = toward_far(p.depth, reversed);
+    let reversed = camera.convention().is_reversed();
+    let disc = |i: usize| {
+        let p = projector.project(positions.array(i))?;
         let reach = [0, 1].map(|k| radius_px.max(radius * per_radius[k] / p.w));
-        let range = |k: usize, side: usize| covered(p.at[k], reach[k], side);
-        let ((x0, x1), (y0, y1)) = (range(0, width), range(1, height));
-        for y in y0..y1 {
-            for x in x0..x1 {
-                let off = [x, y].map(|v| v as f64 + 0.5);
-                let share = |k: usize| {
-                    let distance = (off[k] - p.at[k]).abs();
-                    if distance <= 0.5 { 0.0 } else { distance / reach[k] }
-                };
-                if share(0) * share(0) + share(1) * share(1) > 1.0 {
-                    continue;
-                }
-                let pixel = &mut image[y * width + x];
-                let is_nearer = if reversed { depth > *pixel } else { depth < *pixel };
-                if is_nearer {
-                    *pixel = depth;
-                }
-            }
-        }
-    }
-    Ok(image)
+        let depth = toward_far(p.depth, reversed);
+        (0.0..=1.0).contains(&p.depth).then_some(Disc { at: p.at, reach, depth })
+    };
+    let discs = (0..positions.len() / 3).filter_map(disc);
+    Ok(draw_discs(discs, size, camera.convention()))
 }
 
 /// Pixels of a world unit across the view, along columns and rows, times w.
@@ -290,21 +270,6 @@ fn pixels_per_unit(projector: &Projector) -> [f64; 2] {
         left.iter().map(|v| v * v).sum::<f64>().sqrt()
     };
     [0.5 * projector.size[0] * across(x), 0.5 * projector.size[1] * across(y)]
-}
-
-/// The pixels from the first on to before the second that a disc may cover along an axis.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the image before"
-)]
-fn covered(at: f64, reach: f64, side: usize) -> (usize, usize) {
-    let clamp = |v: f64| v.clamp(0.0, side as f64) as usize;
-    // Its own pixel, whose square `at` lies in, and those with a centre within reach.
-    let own = at.floor();
-    let first = (at - reach - 0.5).ceil().min(own);
-    let end = ((at + reach - 0.5).floor() + 1.0).max(own + 1.0);
-    (clamp(first), clamp(end))
 }
 
 #[cfg(test)]

@@ -31,22 +31,28 @@ impl Stretch {
     /// any pixel position t of the image.
     /// A norm is convex and the rows are linear in t, so one of the image's corners has it.
     pub(crate) fn of(camera: &Camera) -> Self {
-        let rows = camera.rows_near_one();
-        let linear = |r: usize, factor: f64| [0, 1, 2].map(|k| factor * rows[r][k]);
-        let half_width = f64::from(camera.size().width) / 2.0;
-        let half_height = f64::from(camera.size().height) / 2.0;
-        let (x, y, w) = (linear(0, half_width), linear(1, -half_height), linear(3, 1.0));
-        let norm = |t_x: f64, t_y: f64| {
-            let less = |row: Vec3, t: f64| [0, 1, 2].map(|k| row[k] - t * w[k]);
-            let size = |row: Vec3, t: f64| [0, 1, 2].map(|k| row[k].abs() + (t * w[k]).abs());
-            let sizes = [size(x, t_x), size(y, t_y)];
-            let cancelled = sizes.map(|s| dot(s, s)).iter().sum::<f64>().sqrt();
-            operator_norm(less(x, t_x), less(y, t_y)) * ROOM + CANCELLED * cancelled
-        };
-        let corners = [-half_width, half_width]
-            .map(|t_x| norm(t_x, -half_height).max(norm(t_x, half_height)));
-        Self { pixels: corners[0].max(corners[1]), depth: dot(w, w).sqrt() * ROOM }
+        let pixels = at_corners(camera).into_iter().fold(0.0, f64::max);
+        let w = [0, 1, 2].map(|k| camera.rows_near_one()[3][k]);
+        Self { pixels, depth: dot(w, w).sqrt() * ROOM }
     }
+}
+
+/// Upper bounds of the operator norm at the four corners of the image.
+fn at_corners(camera: &Camera) -> [f64; 4] {
+    let rows = camera.rows_near_one();
+    let linear = |r: usize, factor: f64| [0, 1, 2].map(|k| factor * rows[r][k]);
+    let half_width = f64::from(camera.size().width) / 2.0;
+    let half_height = f64::from(camera.size().height) / 2.0;
+    let (x, y, w) = (linear(0, half_width), linear(1, -half_height), linear(3, 1.0));
+    let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)];
+    corners.map(|(right, down)| {
+        let (t_x, t_y) = (right * half_width, down * half_height);
+        let less = |row: Vec3, t: f64| [0, 1, 2].map(|k| row[k] - t * w[k]);
+        let size = |row: Vec3, t: f64| [0, 1, 2].map(|k| row[k].abs() + (t * w[k]).abs());
+        let sizes = [size(x, t_x), size(y, t_y)];
+        let cancelled = sizes.map(|s| dot(s, s)).iter().sum::<f64>().sqrt();
+        operator_norm(less(x, t_x), less(y, t_y)) * ROOM + CANCELLED * cancelled
+    })
 }
 
 /// The greatest length that the matrix of these two rows gives to a unit vector.
@@ -105,10 +111,12 @@ mod tests {
         assert!((found.pixels - 30.0).abs() < 1e-9, "{found:?}");
     }
 
-    /// No position within an off-centre image has a greater norm than its corners.
+    /// No position within an off-centre image has a greater norm than its corners, and each of the
+    /// four is needed.
     #[test]
     fn corners_are_the_greatest() {
         // The borders of the image at depth 1; each of its four corners is farthest out once.
+        let mut without = [0; 4];
         for (left, right, bottom, top) in [
             (-0.3, 2.0, -1.5, 0.1),
             (-2.0, 0.3, -1.5, 0.1),
@@ -118,12 +126,22 @@ mod tests {
             let (near, far, convention) = (0.2, Some(50.0), DepthConvention::Standard);
             let projection =
                 Projection::Frustum { left, right, bottom, top, near, far, convention };
-            corners_are_greatest(&camera(&projection, (30, 20)));
+            let camera = camera(&projection, (30, 20));
+            let greatest = greatest_norm(&camera);
+            let whole = Stretch::of(&camera).pixels;
+            assert!(greatest <= whole && greatest > whole * 0.99, "{greatest} of {whole}");
+            // Planted: one corner is left out.
+            for (left_out, misses) in without.iter_mut().enumerate() {
+                let mut corners = at_corners(&camera);
+                corners[left_out] = 0.0;
+                *misses += i32::from(corners.into_iter().fold(0.0, f64::max) < greatest);
+            }
         }
+        assert_eq!(without, [1; 4], "a corner that is left out shows in one camera");
     }
 
-    fn corners_are_greatest(camera: &Camera) {
-        let whole = Stretch::of(camera).pixels;
+    /// The greatest norm at the corners of all pixels of 30 x 20.
+    fn greatest_norm(camera: &Camera) -> f64 {
         let rows = camera.rows_near_one();
         let row = |r: usize, s: f64| [0, 1, 2].map(|k| s * rows[r][k]);
         let (x, y, w) = (row(0, 15.0), row(1, -10.0), row(3, 1.0));
@@ -144,6 +162,6 @@ mod tests {
                 }
             }
         }
-        assert!(greatest <= whole && greatest > whole * 0.99, "{greatest} of {whole}");
+        greatest
     }
 }

@@ -385,31 +385,16 @@ fn plain_points(positions: &Threes, kind: BoundsKind, indices: &[u32], records: 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::random::Random;
     use crate::host::rounding::sum_up_difference;
 
-    /// Marsaglia's xorshift.
-    struct Random(u64);
-
-    impl Random {
-        fn bits(&mut self) -> u64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            self.0
-        }
-
-        fn pick<T: Copy>(&mut self, of: &[T]) -> T {
-            of[(self.bits() % of.len() as u64) as usize]
-        }
-
-        /// Of any size, with few or all bits of the fraction, and of either sign.
-        fn number(&mut self) -> f64 {
-            let fraction = self.bits() >> self.pick(&[12, 12, 30, 45, 60]);
-            let size = 1.0 + fraction as f64 / 2.0_f64.powi(52);
-            let power = self.pick(&[0, 0, 0, 3, -3, 20, -20, -40, -126, -140, -149, -1000]);
-            let signed = if self.bits() & 1 == 0 { size } else { -size };
-            self.pick(&[signed * 2.0_f64.powi(power), signed, signed * 100.0, 0.0, -0.0])
-        }
+    /// Of any size, with few or all bits of the fraction, and of either sign.
+    fn number(random: &mut Random) -> f64 {
+        let fraction = random.bits() >> random.pick(&[12, 12, 30, 45, 60]);
+        let size = 1.0 + fraction as f64 / 2.0_f64.powi(52);
+        let power = random.pick(&[0, 0, 0, 3, -3, 20, -20, -40, -126, -140, -149, -1000]);
+        let signed = if random.bits() & 1 == 0 { size } else { -size };
+        random.pick(&[signed * 2.0_f64.powi(power), signed, signed * 100.0, 0.0, -0.0])
     }
 
     /// Batches with and without bad numbers: both ways give the same bytes.
@@ -421,7 +406,7 @@ mod tests {
             let narrow = trial % 3 == 0;
             let count = random.pick(&[1, 2, 63, 64]);
             let mut number = || {
-                let v = random.number();
+                let v = number(&mut random);
                 if narrow { f64::from(v as f32) } else { v }
             };
             let mut min: Threes = std::array::from_fn(|_| number());

@@ -252,26 +252,15 @@ fn copied(numbers: Floats<'_>, range: Range<usize>, to: &mut Threes) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::random::Random;
 
-    /// Marsaglia's xorshift.
-    struct Random(u64);
-
-    impl Random {
-        fn bits(&mut self) -> u64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            self.0
-        }
-
-        fn number(&mut self, special: &[f64]) -> f64 {
-            let unit = (self.bits() >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-            match self.bits() % 2000 {
-                0 => special[(self.bits() % special.len() as u64) as usize],
-                // Outliers of every size.
-                1..20 => unit * 2.0_f64.powi((self.bits() % 80) as i32),
-                _ => unit,
-            }
+    fn number(random: &mut Random, special: &[f64]) -> f64 {
+        let unit = random.unit() - 0.5;
+        match random.bits() % 2000 {
+            0 => random.pick(special),
+            // Outliers of every size.
+            1..20 => unit * 2.0_f64.powi((random.bits() % 80) as i32),
+            _ => unit,
         }
     }
 
@@ -305,10 +294,12 @@ mod tests {
         let (mut in_blocks, mut invalid) = (0, 0);
         for trial in 0..40 {
             let few = if trial % 2 == 0 { &special[..] } else { &[0.25] };
-            let min: Vec<f64> = (0..3 * n).map(|_| random.number(few)).collect();
-            let max: Vec<f64> =
-                min.iter().map(|v| v + random.number(few).abs() * f64::from(trial % 3)).collect();
-            let radii: Vec<f64> = (0..n).map(|_| random.number(few).abs()).collect();
+            let min: Vec<f64> = (0..3 * n).map(|_| number(&mut random, few)).collect();
+            let max: Vec<f64> = min
+                .iter()
+                .map(|v| v + number(&mut random, few).abs() * f64::from(trial % 3))
+                .collect();
+            let radii: Vec<f64> = (0..n).map(|_| number(&mut random, few).abs()).collect();
             let narrow = |v: &[f64]| v.iter().map(|v| *v as f32).collect::<Vec<_>>();
             let (min_32, max_32, radii_32) = (narrow(&min), narrow(&max), narrow(&radii));
             let wide = |v| Floats::F64(v);

@@ -189,20 +189,9 @@ fn radix_sort(words: &mut [u64], spare: &mut [u64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::random::Random;
     use crate::input::bounds::Floats;
     use crate::instances::keys::INVALID;
-
-    /// Marsaglia's xorshift.
-    struct Random(u64);
-
-    impl Random {
-        fn unit(&mut self) -> f64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-        }
-    }
 
     fn order_of(centers: &[f64]) -> Vec<u32> {
         let n = centers.len() / 3;

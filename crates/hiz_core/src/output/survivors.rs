@@ -15,7 +15,9 @@ pub(crate) struct SurvivorsRecord {
     pub(crate) count: u32,
     pub(crate) tested: u32,
     pub(crate) accepted: u32,
-    pub(crate) padding: [u32; 2],
+    /// 1 where the mask began full (`shaders/cull/begin_mask.wgsl`).
+    pub(crate) is_full: u32,
+    pub(crate) padding: u32,
     pub(crate) accept_workgroups: [u32; 3],
     pub(crate) accept_count: u32,
 }
@@ -26,7 +28,8 @@ pub(crate) const NO_SURVIVORS: SurvivorsRecord = SurvivorsRecord {
     count: 0,
     tested: 0,
     accepted: 0,
-    padding: [0; 2],
+    is_full: 0,
+    padding: 0,
     accept_workgroups: [0, 1, 1],
     accept_count: 0,
 };
@@ -46,6 +49,9 @@ pub(crate) struct GroupOutput {
     pub(crate) verdicts: wgpu::Buffer,
     /// One per tier of the piece; the first is that of the groups.
     pub(crate) tiers: Vec<TierOutput>,
+    /// What the passes around a mask that may begin full bind; made by the first cull with one.
+    pub(crate) begin_bindings: OnceLock<wgpu::BindGroup>,
+    pub(crate) settle_bindings: OnceLock<wgpu::BindGroup>,
 }
 
 /// What the tests of the boxes of a tier leave.
@@ -70,6 +76,8 @@ impl GroupOutput {
             tiers: (0..piece.tiers())
                 .map(|tier| TierOutput::new(gpu, piece.boxes(tier)))
                 .collect::<Result<_>>()?,
+            begin_bindings: OnceLock::new(),
+            settle_bindings: OnceLock::new(),
         })
     }
 

@@ -202,7 +202,8 @@ impl Pyramid {
             .chunk_sizes()
             .iter()
             .map(|texels| {
-                let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+                let copies = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+                let usage = wgpu::BufferUsages::STORAGE | copies;
                 gpu.empty("hiz.pyramid.chunk", texels * 4, usage)
             })
             .collect::<Result<_>>()?;

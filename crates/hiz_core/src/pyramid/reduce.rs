@@ -228,7 +228,8 @@ pub(crate) fn record_reduce(
     let prepared = Prepared::of_all(gpu, depth, camera, pyramid, reduction)?;
     let numbers = Recording { reduction, base: 0, origin: prepared.built.part.origin };
     let staged = Steps::numbers(gpu, &pyramid.layout.steps, &numbers)?;
-    finish(gpu, encoder, pyramid, prepared, (&pyramid.steps, staged))
+    let header = Some(&pyramid.chunks[0]);
+    finish(gpu, encoder, pyramid, prepared, (&pyramid.steps, staged, header))
 }
 
 /// Records a reduction that is prepared, and notes what the pyramid is built from.
@@ -237,11 +238,11 @@ pub(super) fn finish(
     encoder: &mut wgpu::CommandEncoder,
     pyramid: &Pyramid,
     prepared: Prepared,
-    (steps, staged): (&Steps, Staged),
+    (steps, staged, header): (&Steps, Staged, Option<&wgpu::Buffer>),
 ) -> Result<()> {
     gpu.recorded(|| {
-        steps.record(encoder, staged);
-        // At least one workgroup, which writes the header even if nothing is stored.
+        steps.record(encoder, staged, header);
+        // At least one workgroup, which writes the header of a part even if nothing is stored.
         prepared.record(encoder, steps, |workgroups| workgroups.map(|n| n.max(1)));
         Ok(())
     })?;

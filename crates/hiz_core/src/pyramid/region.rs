@@ -50,7 +50,7 @@ pub(crate) fn record_reduce_region(
     let renewed = (part, built.camera, numbers.reduction);
     let prepared = Prepared::new(gpu, renewed, (&blocks, true), pyramid)?;
     let staged = Steps::numbers_of_part(gpu, &layout.steps, &blocks, &numbers)?;
-    finish(gpu, encoder, pyramid, prepared, (steps, staged))?;
+    finish(gpu, encoder, pyramid, prepared, (steps, staged, None))?;
     if let Some(owner) = built.owner {
         pyramid.keep_with_it(owner);
     }

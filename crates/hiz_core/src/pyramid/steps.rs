@@ -1,5 +1,7 @@
 //! The steps of a pyramid's reductions: what each of them binds.
 
+use std::mem::offset_of;
+
 use crate::error::Result;
 use crate::gpu::buffers::entry;
 use crate::gpu::device::Gpu;
@@ -125,9 +127,17 @@ impl Steps {
     }
 
     /// Records the copies of a recording's numbers into the uniforms of its steps.
-    pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, staged: Staged) {
+    ///
+    /// `header`: the chunk that begins with the number of the reduction, if it renews everything.
+    /// A reduction of a part writes its own header.
+    pub(super) fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        staged: Staged,
+        header: Option<&wgpu::Buffer>,
+    ) {
         let Some(numbers) = staged.numbers else { return };
-        let copies: Vec<_> = (0..)
+        let mut copies: Vec<_> = (0..)
             .zip(&staged.places)
             .map(|(i, place)| Copy {
                 from: i * UNIFORM_BYTES as u64,
@@ -136,6 +146,9 @@ impl Steps {
                 size: UNIFORM_BYTES as u64,
             })
             .collect();
+        // The first step reads the depth image, so its uniform has the number.
+        let from = offset_of!(StepUniform, reduction) as u64;
+        copies.extend(header.map(|target| Copy { from, target, to: 0, size: 4 }));
         numbers.record(encoder, &copies);
     }
 }

@@ -3,9 +3,10 @@
 use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
+use crate::cull::full_mask::begin_mask_module;
 use crate::cull::pipelines::{
     BinKey, Candidates, Decision, DepthStore, EmitKey, FramePass, accept_members_module,
-    cull_boxes_module, cull_members_module, flat_module,
+    cull_boxes_module, cull_members_module, flat_module, settle_groups_module,
 };
 use crate::cull::pixels::pixels_module;
 use crate::cull::refine::{refine_groups_module, refine_module};
@@ -76,6 +77,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("emit_draws".to_owned(), emit_passes::draws_module(PlaneSet::One)),
         ("count".to_owned(), count_module()),
         ("among_order".to_owned(), among_order_module()),
+        ("begin_mask".to_owned(), begin_mask_module()),
         ("join_views".to_owned(), join_module()),
         ("clock_check".to_owned(), clock_check_module()),
         ("update".to_owned(), update_module()),
@@ -148,6 +150,9 @@ pub(super) fn all() -> Vec<(String, Source)> {
                 continue;
             }
             all.push((named("accept_members"), accept_members_module(store, kind, emit, pass)));
+            if pass == FramePass::Alone && matches!(emit, EmitKey::List { .. }) {
+                all.push((named("settle_groups"), settle_groups_module(store, kind, emit)));
+            }
         }
     }
     // Culls of casters report as others do, so one way to emit stands for all.

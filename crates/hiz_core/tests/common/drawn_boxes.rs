@@ -267,13 +267,7 @@ impl BoxRenderer {
 
     /// The words of a buffer after everything that was submitted.
     pub(crate) fn words(&self, buffer: &wgpu::Buffer) -> Vec<u32> {
-        let (told, answer) = std::sync::mpsc::channel();
-        let (device, queue) = (self.engine.device(), self.engine.queue());
-        wgpu::util::DownloadBuffer::read_buffer(device, queue, &buffer.slice(..), move |bytes| {
-            told.send(bytemuck::pod_collect_to_vec(&bytes.expect("mapped"))).expect("waited for");
-        });
-        self.engine.wait().unwrap();
-        answer.recv().unwrap()
+        crate::common::words_of(&self.engine, buffer)
     }
 
     /// How many boxes a cull has listed.

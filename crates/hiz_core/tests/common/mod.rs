@@ -83,6 +83,17 @@ fn open() -> Engine {
     engine
 }
 
+/// The words of a buffer after everything that was submitted.
+pub(crate) fn words_of(engine: &Engine, buffer: &wgpu::Buffer) -> Vec<u32> {
+    let (told, answer) = std::sync::mpsc::channel();
+    let (device, queue) = (engine.device(), engine.queue());
+    wgpu::util::DownloadBuffer::read_buffer(device, queue, &buffer.slice(..), move |bytes| {
+        told.send(bytemuck::pod_collect_to_vec(&bytes.expect("mapped"))).expect("waited for");
+    });
+    engine.wait().unwrap();
+    answer.recv().unwrap()
+}
+
 /// A depth image of a test: one layer, one mip level, one sample.
 pub(crate) fn depth_descriptor(
     (width, height): (u32, u32),

@@ -96,6 +96,26 @@ impl Lossy {
     fn at(&self, v: Vec3) -> Vec3 {
         std::array::from_fn(|k| self.place[k] + (0..3).map(|j| self.axes[j][k] * v[j]).sum::<f64>())
     }
+
+    /// The corners of a wall across the view at depth `z`, in the view's own axes.
+    fn wall(z: f64) -> [Vec3; 4] {
+        [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, y]| [x * z, y * z, z])
+    }
+
+    /// Examines a quad whose corners are in the view's own axes.
+    fn examine(
+        &self,
+        random: &mut Random,
+        how: (Way, Option<PlantedFault>),
+        refinement: u32,
+        corners: [Vec3; 4],
+        tally: &mut Tally,
+    ) {
+        let mut mesh = Mesh::default();
+        mesh.quad(corners.map(|v| self.at(v)));
+        let options = ConservativeDepthOptions { refinement };
+        examine(random, how, &self.camera, &mesh, FaceCull::None, &options, tally);
+    }
 }
 
 /// Walls that face such a camera from a few near planes away.
@@ -106,21 +126,8 @@ pub(crate) fn facing_walls(way: Way, seed: u64, fault: Option<PlantedFault>) -> 
         let near = 1e-4;
         let view = Lossy::new(&mut random, near);
         let z = near * random.range(1.5, 9.0);
-        let mut mesh = Mesh::default();
-        mesh.quad(
-            [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]
-                .map(|[x, y]| view.at([x * z, y * z, z])),
-        );
-        let options = ConservativeDepthOptions { refinement: random.below(2) };
-        examine(
-            &mut random,
-            (way, fault),
-            &view.camera,
-            &mesh,
-            FaceCull::None,
-            &options,
-            &mut tally,
-        );
+        let refinement = random.below(2);
+        view.examine(&mut random, (way, fault), refinement, Lossy::wall(z), &mut tally);
     }
     tally
 }
@@ -132,21 +139,7 @@ pub(crate) fn walls_at_the_near_plane(way: Way, seed: u64, fault: Option<Planted
         let near = 1e-5;
         let view = Lossy::new(&mut random, near);
         let z = near + random.range(-3e-9, 3e-9);
-        let mut mesh = Mesh::default();
-        mesh.quad(
-            [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]
-                .map(|[x, y]| view.at([x * z, y * z, z])),
-        );
-        let options = ConservativeDepthOptions { refinement: 0 };
-        examine(
-            &mut random,
-            (way, fault),
-            &view.camera,
-            &mesh,
-            FaceCull::None,
-            &options,
-            &mut tally,
-        );
+        view.examine(&mut random, (way, fault), 0, Lossy::wall(z), &mut tally);
     }
     tally
 }
@@ -168,18 +161,8 @@ pub(crate) fn cut_borders(way: Way, seed: u64, fault: Option<PlantedFault>) -> T
             ([x * near, y * near, near], [x, -2.0 * view.half[1], 1.0].map(|v| 1e3 * near * v));
         let before: Vec3 = std::array::from_fn(|k| cut[k] - 1e-3 * (far[k] - cut[k]));
         let left = |p: Vec3| [p[0] - 9.0, p[1], p[2]];
-        let mut mesh = Mesh::default();
-        mesh.quad([left(before), left(far), far, before].map(|v| view.at(v)));
-        let options = ConservativeDepthOptions { refinement: 0 };
-        examine(
-            &mut random,
-            (way, fault),
-            &view.camera,
-            &mesh,
-            FaceCull::None,
-            &options,
-            &mut tally,
-        );
+        let corners = [left(before), left(far), far, before];
+        view.examine(&mut random, (way, fault), 0, corners, &mut tally);
     }
     tally
 }

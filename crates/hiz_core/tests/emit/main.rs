@@ -19,7 +19,7 @@ use hiz_core::{
     InstanceOptions, Instances, Lod, MeshLods, MeshTable, Pyramid, VertexDraw, Visible, wgpu,
 };
 
-use crate::common::{Random, camera_along_z, ndc};
+use crate::common::{Random, camera_along_z, ndc, words_of};
 
 const CONVENTION: DepthConvention = DepthConvention::Reversed;
 
@@ -75,20 +75,7 @@ impl World {
     }
 
     fn words(&self, buffer: &wgpu::Buffer) -> Vec<u32> {
-        let (device, queue) = (self.engine.device(), self.engine.queue());
-        let staging = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("test.staging"),
-            size: buffer.size(),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
-        queue.submit([encoder.finish()]);
-        staging.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
-        device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
-        let view = staging.get_mapped_range(..).unwrap();
-        view.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect()
+        words_of(&self.engine, buffer)
     }
 
     fn cull(&self, crowd: &Crowd, visible: &Visible, options: &CullOptions) -> Result<(), Error> {

@@ -25,7 +25,10 @@ pub(crate) const FOLDER: &str = "HIZVK_CASTLE_FOLDER";
 /// If the data is not there; the text says how it comes there.
 pub(crate) fn scene() -> Result<Scene, Failure> {
     let folder = PathBuf::from(std::env::var_os(FOLDER).ok_or_else(|| {
-        format!("the castle is not there: {FOLDER} names no folder with castle.npz unpacked in it")
+        format!(
+            "the castle is not there: {FOLDER} names no folder with castle.npz unpacked in it; \
+             HIZVK_CASTLE=castle.npz make view ARGS='--scene castle' unpacks it first"
+        )
     })?);
     let array = |name: &str| npy::read(&folder.join(format!("{name}.npy")));
     let points = |name: &str| -> Result<Vec<Vec3>, Failure> {

@@ -2,6 +2,7 @@
 //!
 //! `HIZVK_VIEWER_FRAMES` says how many frames the long tests draw of each scene (default: 300).
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use hiz_core::{HizContext, ImageSize, wgpu};
@@ -44,8 +45,18 @@ struct Found {
     ties: usize,
     drawn: u64,
     in_view: u64,
-    /// Samples whose depths differ because the driver computes them beside the samples.
+    /// Samples that lack a fragment of a hidden body whose depth lies nowhere in its bounds.
     excused: usize,
+    /// How many samples may be excused: the driver's share of such fragments, and one more.
+    most_excused: usize,
+}
+
+impl Found {
+    /// What is excused has to stay rare, or the comparison would say little.
+    fn check_excused(&self, name: &str) {
+        let Self { excused, most_excused, .. } = self;
+        assert!(excused <= most_excused, "{name}: {excused} samples beyond bounds");
+    }
 }
 
 impl Pair {
@@ -71,12 +82,25 @@ impl Pair {
         frames: usize,
         moving: bool,
     ) -> Found {
+        self.compare_path(mode, reference, (0..frames, frames), moving)
+    }
+
+    /// [`Pair::compare_moving`] for a part of a path of so many frames.
+    fn compare_path(
+        &mut self,
+        mode: Mode,
+        reference: Mode,
+        (part, frames): (Range<usize>, usize),
+        moving: bool,
+    ) -> Found {
         let mut found = Found::default();
         self.culling.mode = mode;
         self.reference.mode = reference;
         let samples = self.culling.targets.samples;
         let are_right = sample_places::agree(&self.culling.gpu, samples).expect("a picture");
-        for frame in 0..frames {
+        let drawn = SIZE.width as usize * SIZE.height as usize * samples as usize * part.len();
+        found.most_excused = 1 + drawn / if are_right { 2_000_000 } else { 20_000 };
+        for frame in part.clone() {
             let pose = self.culling.scene.pose(frame, frames);
             // Of every other jump the library is told; a stale history costs time alone.
             if self.culling.scene.is_cut(frame, frames) && frame % 2 == 0 {
@@ -92,7 +116,7 @@ impl Pair {
             });
             check_is_a_picture(&expected);
             let mut difference = seen.difference(&expected);
-            if difference.depths > 0 && !are_right {
+            if difference.depths > 0 {
                 let renderers = [&self.culling, &self.reference];
                 found.excused += excuse(&seen, &mut expected, &camera, renderers);
                 difference = seen.difference(&expected);
@@ -105,9 +129,10 @@ impl Pair {
             }
         }
         eprintln!(
-            "{} {}: {frames} frames, {} of {} drawn, {} ties, {} excused, differing: {:?}",
+            "{} {}: {} frames, {} of {} drawn, {} ties, {} excused, differing: {:?}",
             self.culling.scene.name,
             mode.name(),
+            part.len(),
             found.drawn,
             found.in_view,
             found.ties,
@@ -136,8 +161,7 @@ fn equal_pictures(mode: Mode, samples: u32, frames: usize) {
         assert!(4 * found.drawn < 3 * found.in_view, "{name}: {found:?}");
         let pixels = SIZE.width as usize * SIZE.height as usize * frames;
         assert!(found.ties < pixels / 20, "{name}: {} ties", found.ties);
-        let most = pixels * samples as usize / 20_000;
-        assert!(found.excused <= most, "{name}: {} samples beyond bounds", found.excused);
+        found.check_excused(name);
     }
 }
 
@@ -159,8 +183,20 @@ fn two_passes_show_what_all_show_while_bodies_move() {
         let mut pair = Pair::new(&gpu, name, true, 1, &[]);
         let found = pair.compare_moving(Mode::TwoPasses, Mode::Frustum, 8, true);
         assert!(found.differing.is_empty(), "{name}: {:?}", found.differing);
+        found.check_excused(name);
         assert!(4 * found.drawn < 3 * found.in_view, "{name}: {found:?}");
     }
+}
+
+/// A ball hidden by others has a sliver seen edge-on, whose fragment lavapipe puts far in front.
+///
+/// Found by the frames of `make soak`: depth 0.92 where no culled ball is nearer than 0.48.
+#[test]
+fn a_fragment_far_off_its_body_is_no_false_cull() {
+    let mut pair = Pair::new(&gpu(), "arm", true, 1, &[]);
+    let found = pair.compare_path(Mode::TwoPasses, Mode::Frustum, (158..161, 300), true);
+    assert!(found.differing.is_empty(), "{:?}", found.differing);
+    found.check_excused("arm");
 }
 
 /// The frames differ from those at rest, so that something moves.
@@ -253,6 +289,7 @@ fn two_passes_show_what_all_show_in_hundreds_of_frames_while_bodies_move() {
         let mut pair = Pair::new(&gpu, name, true, 1, &[]);
         let found = pair.compare_moving(Mode::TwoPasses, Mode::Frustum, soak_frames(), true);
         assert!(found.differing.is_empty(), "{name}: {:?}", found.differing);
+        found.check_excused(name);
     }
 }
 

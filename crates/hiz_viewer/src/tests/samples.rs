@@ -1,7 +1,10 @@
 //! Where samples lie and where their depths are computed, and what follows where the two differ.
 //!
-//! SwiftShader computes the depths of four samples at places that are mirrored in the pixel.
-//! So a fragment of a surface seen edge-on has a depth that its body has nowhere.
+//! A fragment of a surface seen edge-on can have a depth that its body has nowhere:
+//!
+//! - SwiftShader computes the depths of four samples at places that are mirrored in the pixel.
+//! - lavapipe has, rarely, a fragment of a sliver whose plane is steep.
+//!
 //! A picture with culling may lack such a fragment if its body is hidden: it is excused, once it is
 //! proved to lie beyond the bounds of every body that was culled.
 

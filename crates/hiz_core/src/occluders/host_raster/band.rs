@@ -7,7 +7,7 @@ use std::ops::{Range, RangeInclusive};
 
 use crate::input::image::DepthConvention;
 use crate::occluders::host_raster::edges::{
-    Edges, LARGE, STEP, Segment, Steps, inside, span, to_pixels,
+    Edges, LARGE, STEP, Segment, Spans, Steps, bits, inside, to_pixels,
 };
 use crate::occluders::host_raster::lanes::{lanes, three};
 use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS, greatest, least};
@@ -15,7 +15,7 @@ use crate::occluders::host_raster::planted_fault::is_planted;
 #[cfg(feature = "methods")]
 use crate::occluders::host_raster::tile::is_covered;
 use crate::occluders::host_raster::tile::{
-    CLEAR, FULL, Layers, Mask, PIXELS, Plane, Rise, SIDE, State, Tile, row_of_layers,
+    CLEAR, FULL, Layers, Mask, PIXELS, Pixels, Plane, Rise, SIDE, State, Tile, row_of_layers,
 };
 use crate::occluders::host_raster::triangle::Triangle;
 use crate::occluders::meshlets::LANES;
@@ -50,6 +50,9 @@ pub(super) struct Band {
     first: Vec<f32>,
     risen: Vec<u32>,
     rises: Vec<Rise>,
+    /// By tile: where its layers are in `layers`; 0 until it needs them.
+    slots: Vec<u32>,
+    /// Few tiles have layers, so theirs lie close together and stay in the caches.
     layers: Vec<Layers>,
     pixels: Vec<f32>,
 }
@@ -78,7 +81,8 @@ impl Band {
             first: vec![0.0; count],
             risen: vec![0; count],
             rises: Vec::new(),
-            layers: vec![Layers::default(); count],
+            slots: vec![0; count],
+            layers: vec![Layers::default()],
             pixels: vec![0.0; stride * (bottom - top) as usize],
         }
     }
@@ -92,8 +96,10 @@ impl Band {
             + size_of_val(&self.is_stale[..])
             + size_of_val(&self.is_cell_stale[..])
             + size_of_val(&self.risen[..])
+            + size_of_val(&self.slots[..]);
+        let lists = size_of_val(&self.stale[..])
+            + size_of_val(&self.rises[..])
             + size_of_val(&self.layers[..]);
-        let lists = size_of_val(&self.stale[..]) + size_of_val(&self.rises[..]);
         (floats + tiles + lists) as u64
     }
 
@@ -106,6 +112,8 @@ impl Band {
         self.cells.fill(0.0);
         self.is_cell_stale.fill(false);
         self.rises.clear();
+        self.slots.fill(0);
+        self.layers.truncate(1);
     }
 
     /// Whether nothing within `extent` would show in this band.
@@ -190,16 +198,26 @@ impl Band {
 
     #[inline(always)]
     fn tile(&mut self, index: usize) -> Tile<'_> {
-        let first = index / self.across * SIDE * self.stride + index % self.across * SIDE;
         Tile {
             farthest: &mut self.farthest[index],
             nearest: &mut self.nearest[index],
             state: &mut self.states[index],
-            layers: &mut self.layers[index],
-            pixels: &mut self.pixels[first..],
-            stride: self.stride,
+            layers: &mut self.layers[self.slots[index] as usize],
             fault: self.image.fault,
         }
+    }
+
+    /// The pixels of the tile in this column and row of the band's.
+    #[inline(always)]
+    fn pixels_of(&mut self, (column, row): (usize, usize)) -> Pixels<'_> {
+        let first = row * SIDE * self.stride + column * SIDE;
+        Pixels { from_first: &mut self.pixels[first..], stride: self.stride }
+    }
+
+    /// The layers of a tile, if its state says that it has some.
+    #[inline(always)]
+    fn layers_of(&self, index: usize) -> &Layers {
+        &self.layers[self.slots[index] as usize]
     }
 
     /// The plane of a tile that is [`FULL`].
@@ -208,20 +226,26 @@ impl Band {
         Plane::at(self.first[index], &self.rises[self.risen[index] as usize])
     }
 
-    /// Makes the plane of a tile that is [`FULL`] a layer.
+    /// Gives a tile room for layers, and makes the plane of one that is [`FULL`] a layer.
     #[inline(always)]
     fn settle(&mut self, index: usize) {
+        if self.slots[index] == 0 {
+            self.slots[index] = self.layers.len() as u32;
+            self.layers.push(Layers::default());
+        }
         if self.states[index] == FULL {
             let plane = self.full_plane(index);
             self.tile(index).settle(plane);
         }
     }
 
-    /// Turns whatever a tile is into pixels.
+    /// Turns whatever the tile in this column and row of the band's is into pixels.
     #[inline(never)]
-    fn expand(&mut self, index: usize) {
-        self.settle(index);
-        self.tile(index).expand();
+    fn expand(&mut self, (column, row): (usize, usize)) {
+        let index = row * self.across + column;
+        let rows: [_; SIDE] = std::array::from_fn(|y| self.row_of_tile(column, row, y));
+        self.pixels_of((column, row)).fill(|y| rows[y]);
+        self.states[index] = PIXELS;
     }
 
     /// Draws the part of a triangle that lies in this band.
@@ -247,17 +271,18 @@ impl Band {
 
     /// Draws a triangle of at most [`LANES`] columns, one segment for each row.
     fn draw_by_rows(&mut self, t: &Triangle, edges: &Edges, columns: (i32, i32), rows: (i32, i32)) {
-        let first_tile = |row: i32| (row - self.top) as usize / SIDE * self.across;
+        let tile_row = |row: i32| (row - self.top) as usize / SIDE;
         let (begin, end) = (columns.0 as usize / SIDE, columns.1 as usize / SIDE);
-        for row in (first_tile(rows.0)..=first_tile(rows.1)).step_by(self.across) {
-            for tile in row + begin..=row + end {
+        for row in tile_row(rows.0)..=tile_row(rows.1) {
+            for column in begin..=end {
+                let tile = row * self.across + column;
                 self.nearest[tile] = greatest(self.nearest[tile], t.nearest);
                 if !self.is_stale[tile] {
                     self.is_stale[tile] = true;
                     self.stale.push(tile as u32);
                 }
                 if self.states[tile] != PIXELS {
-                    self.expand(tile);
+                    self.expand((column, row));
                 }
             }
         }
@@ -306,33 +331,29 @@ impl Band {
             }
             return;
         }
-        let mut segment = Segment::default();
+        let mut spans =
+            Spans::new(&edges.at(t, begin * STEP, first * STEP), edges, &steps, (begin, end));
         for row in first..=last {
-            let at = edges.at(t, begin * STEP, row * STEP);
-            let (first, last) = span(&at, &steps.gain, &edges.right, begin, end);
-            if first > last {
+            let [met, covered] = spans.row();
+            spans.step_down();
+            if met.0 >= met.1 {
                 continue;
             }
             let y = to_pixels(row * STEP * UNITS + HALF - t.y[0]);
             let own_row = (row - self.top / STEP) as usize;
-            for group in first / MANY..=last / MANY {
+            for group in met.0 / MANY..=(met.1 - 1) / MANY {
                 let column = group * MANY;
                 let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
                 let (cell_row, cell) = (own_row / LANES, group as usize);
                 if steps.nearest_of_segment(t, x, y) <= self.cell(cell_row, cell) {
                     continue;
                 }
-                let here = three(|k| {
-                    at[k] + i64::from(STEP * (column - begin)) * i64::from(edges.right[k])
-                });
+                let segment = Segment::new(t, &steps, (x, y));
                 let tiles = own_row * self.across + column as usize;
-                let farthest = &self.farthest.as_chunks().0[tiles / LANES];
-                segment.look(t, &steps, &here, (x, y), farthest);
-                // Past the row's end there may be no tile.
-                segment.open &= u32::MAX >> (31 - (last - column).min(31));
-                if segment.open != 0 {
-                    self.replace(&mut segment, tiles);
-                    self.draw_segment(t, edges, &steps, &segment, tiles);
+                let (met, covered) = (bits(met, column), bits(covered, column));
+                let open = self.replace(&segment, tiles, met, covered);
+                if let Some(open) = open {
+                    self.draw_segment(t, edges, &segment, (column, row), (open, covered));
                     self.is_cell_stale[cell_row * (self.across / LANES) + cell] = true;
                 }
             }
@@ -367,7 +388,7 @@ impl Band {
     ) {
         let mut at = edges.at(t, begin * STEP, row * STEP);
         let below = t.slope[1] * to_pixels(row * STEP * UNITS + HALF - t.y[0]);
-        let first = (row - self.top / STEP) as usize * self.across;
+        let own_row = (row - self.top / STEP) as usize;
         for column in begin..=end {
             let here = at;
             for k in 0..3 {
@@ -378,7 +399,7 @@ impl Band {
             }
             let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
             let nearness = (t.nearness + t.slope[0] * x) + below;
-            let index = first + column as usize;
+            let index = own_row * self.across + column as usize;
             let high = least(steps.high[0] + (nearness + steps.high[1]), t.nearest);
             if high <= self.farthest[index] {
                 continue;
@@ -387,30 +408,36 @@ impl Band {
             let is_full = (0..3).all(|k| here[k] + i64::from(steps.loss[k]) >= 0);
             let here = three(|k| here[k].clamp(-LARGE, LARGE) as i32);
             let plane = Plane { nearness, slope: t.slope, nearest: t.nearest };
-            self.draw_tile(index, edges, here, plane, (low, high), is_full, is_large);
-            let cell = (row - self.top / STEP) as usize / LANES * (self.across / LANES);
+            let place = (column as usize, own_row);
+            self.draw_tile(place, edges, here, plane, (low, high), is_full, is_large);
+            let cell = own_row / LANES * (self.across / LANES);
             self.is_cell_stale[cell + column as usize / LANES] = true;
         }
     }
 
     /// Draws a triangle where it covers whole tiles of a segment in front of everything.
+    ///
+    /// `met` and `covered` have a bit for each tile.
+    /// What comes back are the tiles where it may show and is not drawn yet; `None` if it shows
+    /// nowhere.
     #[inline(always)]
-    fn replace(&mut self, segment: &mut Segment, first: usize) {
+    fn replace(&mut self, segment: &Segment, first: usize, met: u32, covered: u32) -> Option<u32> {
         fn part<T>(of: &mut [T], first: usize) -> &mut [T; LANES] {
             &mut of.as_chunks_mut().0[first / LANES]
         }
         let nearest = part(&mut self.nearest, first);
-        let mut front = 0;
+        let farthest = part(&mut self.farthest, first);
+        let (mut open, mut front) = (0, 0);
         for l in 0..LANES {
+            open |= if segment.high[l] > farthest[l] { 1 << l } else { 0 };
             front |= if segment.low[l] >= nearest[l] { 1 << l } else { 0 };
         }
-        front &= segment.open & segment.full;
+        open &= met;
+        front &= open & covered;
         if front == 0 {
-            return;
+            return (open != 0).then_some(open);
         }
-        segment.open &= !front;
         let triangle = self.rises.len() as u32 - 1;
-        let farthest = part(&mut self.farthest, first);
         let states = part(&mut self.states, first);
         let (at, risen) = (part(&mut self.first, first), part(&mut self.risen, first));
         for l in 0..LANES {
@@ -421,38 +448,43 @@ impl Band {
             risen[l] = if is_front { triangle } else { risen[l] };
             states[l] = if is_front { FULL } else { states[l] };
         }
+        Some(open & !front)
     }
 
-    /// Draws a triangle where a segment, which begins with tile `first`, is open to it.
+    /// Draws a triangle into the tiles of a segment that are `open`, of which it covers some.
+    ///
+    /// `column` and `row` are those of the segment's first tile in the image.
     #[inline(always)]
     fn draw_segment(
         &mut self,
         t: &Triangle,
         edges: &Edges,
-        steps: &Steps,
         segment: &Segment,
-        first: usize,
+        (column, row): (i32, i32),
+        (mut open, covered): (u32, u32),
     ) {
-        let mut open = segment.open;
         while open != 0 {
             let l = open.trailing_zeros() as usize % LANES;
             open &= open - 1;
             let plane = Plane { nearness: segment.nearness[l], slope: t.slope, nearest: t.nearest };
             let range = (segment.low[l], segment.high[l]);
-            let is_full = segment.full >> l & 1 == 1;
-            let at = three(|k| segment.at[k] + steps.ramp[k][l]);
-            self.draw_tile(first + l, edges, at, plane, range, is_full, true);
+            let is_full = covered >> l & 1 == 1;
+            let at = edges.at(t, (column + l as i32) * STEP, row * STEP);
+            let at = three(|k| at[k].clamp(-LARGE, LARGE) as i32);
+            let place = (column as usize + l, (row - self.top / STEP) as usize);
+            self.draw_tile(place, edges, at, plane, range, is_full, true);
         }
     }
 
     /// Draws a triangle into one tile: as a layer, or into pixels.
     ///
-    /// `at` are the edges' functions at the tile's first pixel.
+    /// `place` is its column and row in the band, and `at` are the edges' functions at its first
+    /// pixel.
     #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
     #[inline(always)]
     fn draw_tile(
         &mut self,
-        index: usize,
+        place: (usize, usize),
         edges: &Edges,
         at: [i32; 3],
         plane: Plane,
@@ -460,6 +492,7 @@ impl Band {
         is_full: bool,
         is_large: bool,
     ) {
+        let index = place.1 * self.across + place.0;
         if is_full && low >= self.nearest[index] {
             (self.farthest[index], self.nearest[index]) = (low, high);
             (self.first[index], self.states[index]) = (plane.nearness, FULL);
@@ -471,26 +504,30 @@ impl Band {
             let shifted = u32::from(is_planted!(self.image.fault, MasksShifted));
             // A column's rows run from its byte's highest bit.
             let mask = mask >> shifted & (Mask::MAX / 255 * (255 >> shifted));
+            if mask == 0 {
+                return;
+            }
             self.settle(index);
-            if mask == 0 || self.tile(index).add_layer(mask, plane, (low, high)) {
+            if self.tile(index).add_layer(mask, plane, (low, high)) {
                 return;
             }
         }
         if self.states[index] != PIXELS {
-            self.expand(index);
+            self.expand(place);
         }
         self.nearest[index] = greatest(self.nearest[index], high);
         self.is_stale[index] = false;
-        if is_full {
-            self.tile(index).draw_pixels(&plane, |_| [u32::MAX; SIDE]);
-            return;
-        }
-        let mut at_row = edges.columns(at);
-        self.tile(index).draw_pixels(&plane, |_| {
-            let inside = inside(&at_row);
-            edges.step_down(&mut at_row);
-            inside
-        });
+        let mut pixels = self.pixels_of(place);
+        self.farthest[index] = if is_full {
+            pixels.draw(&plane, |_| [u32::MAX; SIDE])
+        } else {
+            let mut at_row = edges.columns(at);
+            pixels.draw(&plane, |_| {
+                let inside = inside(&at_row);
+                edges.step_down(&mut at_row);
+                inside
+            })
+        };
     }
 
     /// Computes the farthest depths again of the tiles whose pixels were written.
@@ -502,7 +539,7 @@ impl Band {
                 let (row, column) = (index / self.across, index % self.across);
                 let cell = row / LANES * (self.across / LANES) + column / LANES;
                 self.is_cell_stale[cell] = true;
-                self.tile(index).renew();
+                self.farthest[index] = self.pixels_of((column, row)).farthest();
                 if is_planted!(self.image.fault, RenewedTooNear) {
                     self.farthest[index] = self.nearest[index];
                 }
@@ -518,7 +555,7 @@ impl Band {
         let tile = row * self.across + column;
         match self.states[tile] {
             CLEAR | FULL | PIXELS => Some(self.farthest[tile]),
-            state => (!is_covered(state, &self.layers[tile])).then_some(0.0),
+            state => (!is_covered(state, self.layers_of(tile))).then_some(0.0),
         }
     }
 
@@ -532,7 +569,7 @@ impl Band {
                 self.pixels[first..].as_chunks().0[0]
             }
             FULL => self.full_plane(tile).row(y),
-            state => row_of_layers(state, &self.layers[tile], y, self.image.fault),
+            state => row_of_layers(state, self.layers_of(tile), y, self.image.fault),
         }
     }
 
@@ -582,7 +619,7 @@ impl Band {
                         fill(block, depth_of, |y| plane.row(y));
                     }
                     state => {
-                        let layers = &self.layers[tile];
+                        let layers = self.layers_of(tile);
                         fill(block, depth_of, |y| row_of_layers(state, layers, y, fault));
                     }
                 }

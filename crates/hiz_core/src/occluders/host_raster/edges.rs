@@ -1,7 +1,7 @@
 //! What a triangle does from pixel to pixel and from tile to tile: its edges and its depth.
 
 use crate::occluders::host_raster::lanes::{lanes, three};
-use crate::occluders::host_raster::lens::{HALF, UNITS, greatest, least};
+use crate::occluders::host_raster::lens::{HALF, UNITS, least};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::{Mask, SIDE};
 use crate::occluders::host_raster::triangle::Triangle;
@@ -99,14 +99,12 @@ pub(super) fn inside(edges: &[[i32; LANES]; 3]) -> [u32; LANES] {
     lanes(|l| !((edges[0][l] | edges[1][l] | edges[2][l]) >> 31) as u32)
 }
 
-/// Beyond this size the sign of an edge's function is the same over [`LANES`] tiles.
+/// Beyond this size the sign of an edge's function is the same over a tile.
 pub(super) const LARGE: i64 = 1 << 30;
 
-/// What a triangle's functions do within a tile and from tile to tile.
+/// What a triangle's functions do within a tile.
 pub(super) struct Steps {
-    /// Growth of the edges' functions over the next [`LANES`] tiles of a row.
-    pub(super) ramp: [[i32; LANES]; 3],
-    /// What they gain and lose at most within a tile.
+    /// What the edges' functions gain and lose at most within a tile.
     pub(super) gain: [i32; 3],
     pub(super) loss: [i32; 3],
     /// The nearness at a tile's farthest and at its nearest corner, less that at its first pixel:
@@ -122,7 +120,6 @@ impl Steps {
         let middle = if is_planted!(fault, FarthestInTheMiddle) { 0.5 } else { 1.0 };
         let corner = |k: usize, is_last: bool| t.slope[k] * if is_last { last as f32 } else { 0.0 };
         Self {
-            ramp: three(|k| lanes(|l| STEP * edges.right[k] * l as i32)),
             gain: three(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
             loss: three(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
             low: std::array::from_fn(|k| corner(k, t.slope[k] < 0.0) * middle),
@@ -130,7 +127,7 @@ impl Steps {
         }
     }
 
-    /// The greatest nearness over [`LANES`] tiles; `x` and `y` as for [`Segment::look`].
+    /// The greatest nearness over [`LANES`] tiles; `x` and `y` as for [`Segment::new`].
     #[inline(always)]
     pub(super) fn nearest_of_segment(&self, t: &Triangle, x: f32, y: f32) -> f32 {
         // Rounded sums are monotone, so one of the two ends has the greatest value of all.
@@ -140,90 +137,151 @@ impl Steps {
     }
 }
 
-/// [`LANES`] tiles in a row, and how a triangle meets them.
-#[derive(Default)]
+/// The depth of a triangle over [`LANES`] tiles in a row.
 pub(super) struct Segment {
-    /// The edges' functions at the first pixel of the first one.
-    pub(super) at: [i32; 3],
     /// Nearness at the first pixel of each, and the least and the greatest over each.
     pub(super) nearness: [f32; LANES],
     pub(super) low: [f32; LANES],
     pub(super) high: [f32; LANES],
-    /// A bit for each tile that the triangle may change, and one for each that it covers.
-    pub(super) open: u32,
-    pub(super) full: u32,
 }
 
 impl Segment {
-    /// `first` are the edges' functions at the first pixel, `x` and `y` its centre from corner 0 in
-    /// pixels, and `farthest` what is known of the tiles.
-    #[inline(never)]
-    pub(super) fn look(
-        &mut self,
-        t: &Triangle,
-        steps: &Steps,
-        first: &[i64; 3],
-        (x, y): (f32, f32),
-        farthest: &[f32; LANES],
-    ) {
-        let at = three(|k| first[k].clamp(-LARGE, LARGE) as i32);
-        let (mut most, mut least_of_edges) = ([0; LANES], [0; LANES]);
-        for k in 0..3 {
-            for l in 0..LANES {
-                let value = at[k] + steps.ramp[k][l];
-                most[l] |= value + steps.gain[k];
-                least_of_edges[l] |= value + steps.loss[k];
-            }
-        }
+    /// `x` and `y` are the centre of the first tile's first pixel from corner 0, in pixels.
+    #[inline(always)]
+    pub(super) fn new(t: &Triangle, steps: &Steps, (x, y): (f32, f32)) -> Self {
         let below = t.slope[1] * y;
-        let mut shows = [0; LANES];
-        for l in 0..LANES {
-            let nearness = (t.nearness + t.slope[0] * (x + (l * SIDE) as f32)) + below;
-            self.nearness[l] = nearness;
-            // As in `Plane::row`.
-            self.low[l] = least(steps.low[0] + (nearness + steps.low[1]), t.nearest);
-            let high = least(steps.high[0] + (nearness + steps.high[1]), t.nearest);
-            self.high[l] = high;
-            shows[l] = if high > farthest[l] { 1 << l } else { 0 };
+        let nearness = lanes(|l| (t.nearness + t.slope[0] * (x + (l * SIDE) as f32)) + below);
+        // As in `Plane::row`.
+        let over =
+            |[right, down]: [f32; 2]| lanes(|l| least(right + (nearness[l] + down), t.nearest));
+        Self { nearness, low: over(steps.low), high: over(steps.high) }
+    }
+}
+
+/// How many tiles a triangle meets and covers in one row of tiles after the other.
+///
+/// Along a row an edge's function grows by the same number from tile to tile.
+/// So the tiles where it is not negative end at a quotient of two integers.
+/// From row to row the dividend grows by the same number, too.
+/// Its quotient and its remainder are carried along, as for a line (Bresenham 1965): exactly, and
+/// with divisions for the first row alone.
+pub(super) struct Spans {
+    edges: [EdgeSpans; 3],
+    /// The first and the last tile that the triangle may meet.
+    begin: i32,
+    count: i64,
+}
+
+/// Where one edge ends the tiles of a row.
+struct EdgeSpans {
+    /// The sign of the growth along a row.
+    right: i32,
+    /// Its size, which divides.
+    step: i64,
+    /// Of the greatest and of the least value over the row's first tile.
+    met: Quotient,
+    covered: Quotient,
+    /// Of the growth from row to row.
+    down: Quotient,
+}
+
+#[derive(Clone, Copy)]
+struct Quotient {
+    whole: i64,
+    rest: i64,
+}
+
+impl Quotient {
+    /// Rounded down, for a dividend below 2^53 in size.
+    #[inline(always)]
+    fn new(dividend: i64, divisor: i64) -> Self {
+        // In float64, because some processors divide 64-bit integers slowly.
+        #[expect(clippy::cast_possible_truncation, reason = "rounded towards zero, then corrected")]
+        let mut whole = (dividend as f64 / divisor as f64) as i64;
+        let mut rest = dividend - whole * divisor;
+        if rest < 0 {
+            (whole, rest) = (whole - 1, rest + divisor);
+        } else if rest >= divisor {
+            (whole, rest) = (whole + 1, rest - divisor);
         }
-        (self.at, self.open, self.full) = (at, 0, 0);
-        for l in 0..LANES {
-            self.open |= (shows[l] & !(most[l] >> 31)) as u32;
-            self.full |= ((1 << l) & !(least_of_edges[l] >> 31)) as u32;
+        Self { whole, rest }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, other: Self, divisor: i64) {
+        self.whole += other.whole;
+        self.rest += other.rest;
+        if self.rest >= divisor {
+            self.whole += 1;
+            self.rest -= divisor;
         }
     }
+}
+
+impl Spans {
+    /// `at` are the edges' functions at the first pixel of tile `begin` in the first row.
+    #[inline(always)]
+    pub(super) fn new(
+        at: &[i64; 3],
+        edges: &Edges,
+        steps: &Steps,
+        (begin, end): (i32, i32),
+    ) -> Self {
+        let edges = three(|k| {
+            let step = i64::from((STEP * edges.right[k]).abs().max(1));
+            let quotient = |dividend: i64| Quotient::new(dividend, step);
+            EdgeSpans {
+                right: edges.right[k].signum(),
+                step,
+                met: quotient(at[k] + i64::from(steps.gain[k])),
+                covered: quotient(at[k] + i64::from(steps.loss[k])),
+                down: quotient(i64::from(STEP * edges.down[k])),
+            }
+        });
+        Self { edges, begin, count: i64::from(end - begin) + 1 }
+    }
+
+    /// The tiles of the row that the triangle may change, and those that it covers, from the first
+    /// one to the one after the last.
+    #[inline(always)]
+    pub(super) fn row(&self) -> [(i32, i32); 2] {
+        [self.tiles(|edge| edge.met), self.tiles(|edge| edge.covered)]
+    }
+
+    #[inline(always)]
+    fn tiles(&self, of: impl Fn(&EdgeSpans) -> Quotient) -> (i32, i32) {
+        let (mut first, mut end) = (0, self.count);
+        for edge in &self.edges {
+            let quotient = of(edge).whole;
+            if edge.right > 0 {
+                first = first.max(-quotient);
+            } else if edge.right < 0 {
+                end = end.min(quotient + 1);
+            } else if quotient < 0 {
+                end = 0;
+            }
+        }
+        let tile = |from_begin: i64| self.begin + from_begin.clamp(0, self.count) as i32;
+        (tile(first), tile(end))
+    }
+
+    #[inline(always)]
+    pub(super) fn step_down(&mut self) {
+        for edge in &mut self.edges {
+            edge.met.add(edge.down, edge.step);
+            edge.covered.add(edge.down, edge.step);
+        }
+    }
+}
+
+/// A bit for each of the [`LANES`] tiles from `first` on that lie in a range.
+#[inline(always)]
+pub(super) fn bits((begin, end): (i32, i32), first: i32) -> u32 {
+    let below = |tile: i32| (1_u32 << (tile - first).clamp(0, LANES as i32)) - 1;
+    below(end) & !below(begin)
 }
 
 #[inline(always)]
 pub(super) fn to_pixels(units: i32) -> f32 {
     units as f32 * (1.0 / UNITS as f32)
-}
-
-/// The tiles of a row that no edge excludes as a whole.
-///
-/// A tile to spare on each side covers the roundings; exact tests follow.
-#[inline(always)]
-pub(super) fn span(
-    at: &[i64; 3],
-    gain: &[i32; 3],
-    right: &[i32; 3],
-    begin: i32,
-    end: i32,
-) -> (i32, i32) {
-    let (mut first, mut last) = (begin, end);
-    let count = (end - begin + 2) as f32;
-    // How many tiles from `begin` on; far outside of the row there is nothing to tell apart.
-    let tiles = |value: f32, step: f32| greatest(-2.0, least(value / step, count)) as i32;
-    for k in 0..3 {
-        let value = (at[k] + i64::from(gain[k])) as f32;
-        let step = SIDE as f32 * right[k] as f32;
-        if right[k] > 0 {
-            first = first.max(begin + tiles(-value, step) - 1);
-        } else if right[k] < 0 {
-            last = last.min(begin + tiles(value, -step) + 1);
-        } else if value < 0.0 {
-            return (begin, begin - 1);
-        }
-    }
-    (first, last)
 }

@@ -106,10 +106,14 @@ pub(super) struct Tile<'a> {
     pub(super) nearest: &'a mut f32,
     pub(super) state: &'a mut State,
     pub(super) layers: &'a mut Layers,
-    /// The band's pixels from the tile's first one on, and how many there are in a row.
-    pub(super) pixels: &'a mut [f32],
-    pub(super) stride: usize,
     pub(super) fault: Planted,
+}
+
+/// The pixels of a tile.
+pub(super) struct Pixels<'a> {
+    /// The band's pixels from the tile's first one on, and how many there are in a row.
+    pub(super) from_first: &'a mut [f32],
+    pub(super) stride: usize,
 }
 
 /// One row of a mask: all bits of a lane for a pixel that is covered.
@@ -122,13 +126,6 @@ fn mask_row(columns: &[u32; SIDE], row: usize) -> [u32; SIDE] {
 fn columns_of(mask: Mask) -> [u32; SIDE] {
     let bytes = mask.to_le_bytes();
     lanes(|l| u32::from(bytes[l]))
-}
-
-#[inline(always)]
-fn row_mut(pixels: &mut [f32], at: usize) -> &mut [f32; SIDE] {
-    // The slice has this length.
-    let Ok(row) = (&mut pixels[at..at + SIDE]).try_into() else { unreachable!() };
-    row
 }
 
 impl Tile<'_> {
@@ -191,48 +188,58 @@ impl Tile<'_> {
         }
         true
     }
+}
 
-    /// Turns layers into pixels.
+impl Pixels<'_> {
     #[inline(always)]
-    pub(super) fn expand(&mut self) {
-        for row in 0..SIDE {
-            *row_mut(self.pixels, row * self.stride) =
-                row_of_layers(*self.state, self.layers, row, self.fault);
-        }
-        *self.state = PIXELS;
+    fn row(&mut self, row: usize) -> &mut [f32; SIDE] {
+        let first = row * self.stride;
+        // The slice has this length.
+        let Ok(row) = (&mut self.from_first[first..first + SIDE]).try_into() else {
+            unreachable!()
+        };
+        row
     }
 
-    /// Draws a plane into the pixels that `covered` names row by row.
+    /// Writes all of them, row by row.
     #[inline(always)]
-    pub(super) fn draw_pixels(
+    pub(super) fn fill(&mut self, nearness: impl Fn(usize) -> [f32; SIDE]) {
+        for row in 0..SIDE {
+            *self.row(row) = nearness(row);
+        }
+    }
+
+    /// Draws a plane into those that `covered` names row by row; returns the farthest of all.
+    #[inline(always)]
+    pub(super) fn draw(
         &mut self,
         plane: &Plane,
         mut covered: impl FnMut(usize) -> [u32; SIDE],
-    ) {
+    ) -> f32 {
         let mut farthest = [f32::MAX; SIDE];
         for row in 0..SIDE {
             let (covered, nearness) = (covered(row), plane.row(row));
-            let pixels = row_mut(self.pixels, row * self.stride);
+            let pixels = self.row(row);
             for l in 0..SIDE {
                 let drawn = f32::from_bits(nearness[l].to_bits() & covered[l]);
                 pixels[l] = greatest(drawn, pixels[l]);
                 farthest[l] = least(pixels[l], farthest[l]);
             }
         }
-        *self.farthest = least_of(&farthest);
+        least_of(&farthest)
     }
 
-    /// Computes `farthest` again after pixels were written.
+    /// The farthest of them.
     #[inline(never)]
-    pub(super) fn renew(&mut self) {
+    pub(super) fn farthest(&mut self) -> f32 {
         let mut farthest = [f32::MAX; SIDE];
         for row in 0..SIDE {
-            let pixels = row_mut(self.pixels, row * self.stride);
+            let pixels = self.row(row);
             for l in 0..SIDE {
                 farthest[l] = least(pixels[l], farthest[l]);
             }
         }
-        *self.farthest = least_of(&farthest);
+        least_of(&farthest)
     }
 }
 

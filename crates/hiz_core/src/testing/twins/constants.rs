@@ -6,6 +6,7 @@ use super::declared;
 use crate::cull::among;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
+use crate::cull::full_mask;
 use crate::cull::groups::GROUPS_OF_RUN;
 use crate::cull::history::HISTORY_BEGIN;
 use crate::cull::lod::LodRule;
@@ -67,6 +68,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/among_layout", "AMONG_BITS", int(u32::BITS)),
         ("cull/among_layout", "AMONG_PER_ROW_LOG2", int(among::WORDS_PER_ROW.ilog2())),
         ("cull/among_order", "WORKGROUP", int(among::WORKGROUP)),
+        ("cull/begin_mask", "WORKGROUP", int(full_mask::WORKGROUP)),
+        ("cull/begin_mask", "WORDS_OF_INVOCATION", int(full_mask::WORDS_OF_INVOCATION)),
         ("cull/candidates", "SET_BY_HISTORY", int(Candidates::History as u32)),
         ("cull/candidates", "SET_BY_SIZE", int(Candidates::Size as u32)),
         ("cull/candidates", "SET_GIVEN", int(Candidates::Given as u32)),
@@ -189,6 +192,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
     ("cull/decision", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
+    ("cull/begin_mask", &["ALL_BITS", "FULL_BELOW"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
     ("cull/pixels", &["ONE_TILE", "TILE_LOG2", "MAX_TILES", "WHOLE_IMAGE_LOG2", "CLASSES"]),
@@ -413,6 +417,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("atomic_8x4", [8, 4, 1]),
         ("atomic_8x8", [8, 8, 1]),
         ("begin", line(1)),
+        ("begin_mask", line(full_mask::WORKGROUP)),
         ("choose_lods", line(lod::LANES)),
         ("cut", line(CUT_WORKGROUP)),
         ("emit_bins", line(emit_passes::WORKGROUP)),
@@ -453,6 +458,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("scatter_receivers", [MASK_SIDE, MASK_SIDE, 1]),
         ("refine", line(refine::WORKGROUP)),
         ("refine_groups", line(refine::WORKGROUP)),
+        ("settle_groups", line(GROUP as u32)),
         ("replace_groups", line(update::WORKGROUP)),
         ("replace_records", line(update::WORKGROUP)),
         ("resolve", line(resolve::WORKGROUP)),

@@ -175,7 +175,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         twin!("Survivors", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
             "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
-            "accepted" = accepted, "padding" = padding,
+            "accepted" = accepted, "is_full" = is_full, "padding" = padding,
             "accept_workgroups" = accept_workgroups,
             "accept_workgroups_y" = accept_workgroups + 4,
             "accept_workgroups_z" = accept_workgroups + 8, "accept_count" = accept_count,
@@ -183,7 +183,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         twin!("Parents", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
             "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
-            "accepted" = accepted, "padding" = padding,
+            "accepted" = accepted, "is_full" = is_full, "padding" = padding,
             "accept_workgroups" = accept_workgroups,
             "accept_workgroups_y" = accept_workgroups + 4,
             "accept_workgroups_z" = accept_workgroups + 8, "accept_count" = accept_count,
