@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 use crate::gpu::checked::checked;
-use crate::gpu::kept::{KeptBuffers, Ring};
+use crate::gpu::kept::{Kept, KeptBuffers, Ring};
 use crate::gpu::layouts::{Binding, Layouts};
 use crate::gpu::made::Making;
 use crate::gpu::pipelines::{Compute, Depth, Pipelines};
@@ -29,6 +29,12 @@ impl ContextId {
 /// Staging buffers for the numbers of recordings that are kept at most.
 const STAGING_KEPT: usize = 16;
 
+/// Large staging buffers are kept for so many sizes, and of each size so many, within so many
+/// bytes.
+const STAGING_SIZES: usize = 2;
+const STAGING_OF_A_SIZE: u64 = 3;
+const STAGING_BYTES_OF_A_SIZE: u64 = 64 << 20;
+
 /// A device, its limits, and the objects that are made on it once.
 #[derive(Debug)]
 pub(crate) struct Gpu {
@@ -41,6 +47,8 @@ pub(crate) struct Gpu {
     pub(super) pipelines: Pipelines,
     pub(super) buffers: KeptBuffers,
     pub(super) ring: Ring,
+    /// Staging buffers by their size; see [`Gpu::kept_staging`].
+    staging: Kept<u64, Ring>,
     /// Bound in place of a sampled texture that a call does not read.
     pub(super) no_texels: OnceLock<wgpu::TextureView>,
     /// Bound in place of an atlas.
@@ -71,6 +79,7 @@ impl Gpu {
             pipelines: Pipelines::default(),
             buffers: KeptBuffers::default(),
             ring: Ring::new(STAGING_KEPT),
+            staging: Kept::new(STAGING_SIZES),
             no_texels: OnceLock::new(),
             no_atlas: OnceLock::new(),
             making: Making::default(),
@@ -91,6 +100,14 @@ impl Gpu {
         }
         let faults = faults.iter().map(|(what, by)| ((*what).to_owned(), (*by).to_owned()));
         Self { faults: faults.collect(), ..self }
+    }
+
+    /// The large staging buffers of this size that are free; see [`Ring`].
+    ///
+    /// A buffer that is made anew is zeroed by wgpu, and its pages may be new to the process.
+    pub(crate) fn kept_staging(&self, bytes: u64) -> Result<Ring> {
+        let most = (STAGING_BYTES_OF_A_SIZE / bytes.max(1)).min(STAGING_OF_A_SIZE);
+        self.staging.get(bytes, || Ok(Ring::new(most as usize)))
     }
 
     pub(crate) fn device(&self) -> &wgpu::Device {

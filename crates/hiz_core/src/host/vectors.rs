@@ -47,6 +47,12 @@ pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
     work()
 }
 
+/// `all` without an early end, which would keep a compiler from making vectors.
+#[inline(always)]
+pub(crate) fn are_all(each: impl Iterator<Item = bool>) -> bool {
+    each.fold(0_u32, |wrong, is_so| wrong | u32::from(!is_so)) == 0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,10 +9,10 @@
 
 use wgpu::WriteOnly;
 
-use crate::host::vectors;
+use crate::host::vectors::{self, are_all};
 use crate::input::bounds::{Bounds, BoundsKind, Floats};
 use crate::instances::aabb::Aabb;
-use crate::instances::narrow::{Fetched, are_all, around_spheres, round_up_from_0};
+use crate::instances::narrow::{Fetched, around_spheres, round_up_from_0};
 use crate::instances::point::{PointRecord, WidePointRecord};
 use crate::instances::volume_record::{BoxRecord, LARGEST, OrientedBoxRecord, SphereRecord};
 use crate::instances::write_record::write_absent;

@@ -10,9 +10,8 @@ use std::ops::Range;
 use crate::error::Result;
 use crate::host::curve::spread;
 use crate::host::memory;
-use crate::host::vectors;
+use crate::host::vectors::{self, are_all};
 use crate::input::bounds::{Bounds, Floats};
-use crate::instances::narrow::are_all;
 
 /// Bits of a cell's number along each axis.
 const AXIS_BITS: u32 = 19;

@@ -26,6 +26,7 @@ pub(crate) mod groups;
 pub(crate) mod keys;
 pub(crate) mod morton;
 pub(crate) mod narrow;
+pub(crate) mod narrow_boxes;
 pub(crate) mod order;
 pub(crate) mod piece;
 pub(crate) mod point;

@@ -11,7 +11,7 @@
 //! So an outlier does not coarsen the cells of the others.
 //! An instance a million times as far away as all others lies in an outer cube of its own.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
 use crate::error::Result;
 use crate::host::memory;
@@ -26,7 +26,7 @@ const SAMPLES: usize = 4096;
 /// One takes tens of microseconds to start, and sorting them takes milliseconds.
 const PARALLEL_FROM: usize = 1 << 15;
 
-/// The most parts that are sorted at the same time; each reads the keys of all.
+/// The most parts that are sorted at the same time.
 const MOST_PARTS: usize = 16;
 
 /// Instances whose keys one thread computes at a time.
@@ -47,22 +47,27 @@ pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>
     let cube = Cube::new(bounds, &range)?;
     let key = |index: usize| cube.key_of(bounds, range.start + index);
     let threads = if range.len() < PARALLEL_FROM { 1 } else { cores().min(MOST_PARTS) };
+    let starts = starts(range.len(), key, threads)?;
     let mut words = memory::list(range.len(), "order")?;
     words.resize(range.len(), 0);
-    let parts = words.chunks_mut(KEYED_AT_A_TIME).enumerate();
-    on_threads(threads, parts, |(part, words): (usize, &mut [u64])| {
-        let first = part * KEYED_AT_A_TIME;
-        cube.keys(bounds, range.start + first, words);
-        for (index, word) in (first..).zip(words) {
+    let mut ends = memory::list(range.len().div_ceil(KEYED_AT_A_TIME), "order")?;
+    ends.resize(range.len().div_ceil(KEYED_AT_A_TIME), [0; MOST_PARTS]);
+    let chunks = words.chunks_mut(KEYED_AT_A_TIME).zip(&mut ends).enumerate();
+    on_threads(threads, chunks, |(chunk, (words, ends)): (_, (&mut [u64], &mut Ends))| {
+        let first = chunk * KEYED_AT_A_TIME;
+        let mut scratch = [0; KEYED_AT_A_TIME];
+        let keyed = &mut scratch[..words.len()];
+        cube.keys(bounds, range.start + first, keyed);
+        for (index, word) in (first..).zip(&mut *keyed) {
             *word = *word >> INDEX_BITS << INDEX_BITS | index as u64;
         }
+        *ends = group(keyed, &starts, words);
     });
     let mut sorted: Vec<Result<Vec<u64>>> = (0..threads).map(|_| Ok(Vec::new())).collect();
-    let starts = starts(&words, threads)?;
     on_threads(threads, sorted.iter_mut().enumerate(), |(part, sorted)| {
-        *sorted = sort_part(&words, starts[part]..=starts[part + 1], key);
+        *sorted = words_of(&words, &ends, part).and_then(|mine| sort_part(mine, key));
     });
-    drop(words);
+    drop((words, ends));
     let mut order = memory::list(range.len(), "order")?;
     for part in sorted {
         order.extend(part?.iter().map(|word| index_of(*word) as u32));
@@ -74,38 +79,62 @@ fn index_of(word: u64) -> usize {
     (word & ((1 << INDEX_BITS) - 1)) as usize
 }
 
-/// The least word of each part by a sample, and the greatest of the last one.
+/// Where the words of each part end in a chunk.
+type Ends = [u32; MOST_PARTS];
+
+/// The least word of each part but the first, by a sample of the keys.
 /// Words with one key are in one part.
-fn starts(words: &[u64], parts: usize) -> Result<Vec<u64>> {
-    let step = words.len().div_ceil(SAMPLES).max(1);
+fn starts(count: usize, key: impl Fn(usize) -> u64, parts: usize) -> Result<Vec<u64>> {
+    if parts == 1 {
+        return Ok(Vec::new());
+    }
+    let step = count.div_ceil(SAMPLES).max(1);
     let mut sample = memory::list(SAMPLES, "order")?;
-    sample.extend(words.iter().step_by(step).map(|word| word >> INDEX_BITS << INDEX_BITS));
+    sample.extend((0..count).step_by(step).map(|index| key(index) >> INDEX_BITS << INDEX_BITS));
     sample.sort_unstable();
-    let inner = (1..parts).map(|k| sample[k * sample.len() / parts]);
-    Ok([0].into_iter().chain(inner).chain([u64::MAX]).collect())
+    Ok((1..parts).map(|k| sample[k * sample.len() / parts]).collect())
 }
 
-/// The words of a part, sorted by the whole keys of their instances.
-/// `part` ends with the first word of the next part, which only the last part takes.
-fn sort_part(
-    words: &[u64],
-    part: RangeInclusive<u64>,
-    key: impl Fn(usize) -> u64,
-) -> Result<Vec<u64>> {
-    let (start, end) = part.into_inner();
-    let is_last = end == u64::MAX;
-    let is_mine = |word: u64| start <= word && (word < end || is_last);
-    let count = words.iter().map(|word| usize::from(is_mine(*word))).sum();
-    let mut mine = memory::list(count + 1, "order")?;
-    mine.resize(count + 1, 0);
-    let mut filled = 0;
-    for word in words {
-        // Without a branch, which no processor could predict.
-        // What is not of this part is overwritten by the next word.
-        mine[filled] = *word;
-        filled += usize::from(is_mine(*word));
+/// Writes the words of a chunk to `to`, part by part, and otherwise in their order.
+fn group(words: &[u64], starts: &[u64], to: &mut [u64]) -> Ends {
+    let mut ends = [0; MOST_PARTS];
+    if starts.is_empty() {
+        to.copy_from_slice(words);
+        ends[0] = words.len() as u32;
+        return ends;
     }
-    mine.truncate(count);
+    let mut filled = 0;
+    for (part, end) in ends.iter_mut().enumerate().take(starts.len() + 1) {
+        let start = if part == 0 { 0 } else { starts[part - 1] };
+        let is_last = part == starts.len();
+        let next = if is_last { u64::MAX } else { starts[part] };
+        for word in words {
+            // Without a branch that no processor could predict.
+            // What is not of this part is overwritten by the next word.
+            let Some(slot) = to.get_mut(filled) else { break };
+            *slot = *word;
+            filled += usize::from((start <= *word) & ((*word < next) | is_last));
+        }
+        *end = filled as u32;
+    }
+    ends
+}
+
+/// The words of a part, of all chunks.
+fn words_of(words: &[u64], ends: &[Ends], part: usize) -> Result<Vec<u64>> {
+    let here = |ends: &Ends| if part == 0 { 0 } else { ends[part - 1] }..ends[part];
+    let count = ends.iter().map(|ends| here(ends).len()).sum();
+    let mut mine = memory::list(count, "order")?;
+    for (words, ends) in words.chunks(KEYED_AT_A_TIME).zip(ends) {
+        let here = here(ends);
+        mine.extend_from_slice(&words[here.start as usize..here.end as usize]);
+    }
+    Ok(mine)
+}
+
+/// Sorts the words of a part by the whole keys of their instances.
+/// The indices of equal keys ascend already.
+fn sort_part(mut mine: Vec<u64>, key: impl Fn(usize) -> u64) -> Result<Vec<u64>> {
     let mut spare = memory::collected(mine.iter().copied(), "order")?;
     radix_sort(&mut mine, &mut spare);
     drop(spare);
@@ -247,17 +276,26 @@ mod tests {
     #[test]
     fn any_number_of_parts_gives_the_same_order() {
         let key = |i: usize| (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20 << 18;
+        let n = 3 * KEYED_AT_A_TIME + 77;
         let words: Vec<u64> =
-            (0..5000).map(|i| key(i) >> INDEX_BITS << INDEX_BITS | i as u64).collect();
-        let whole = sort_part(&words, 0..=u64::MAX, key).unwrap();
+            (0..n).map(|i| key(i) >> INDEX_BITS << INDEX_BITS | i as u64).collect();
+        let whole = sort_part(words.clone(), key).unwrap();
         assert!(whole.is_sorted_by_key(|w| (key(index_of(*w)), index_of(*w))));
-        for parts in [2, 3, 7, 16] {
-            let starts = starts(&words, parts).unwrap();
-            let joined: Vec<u64> = (0..parts)
-                .flat_map(|k| sort_part(&words, starts[k]..=starts[k + 1], key).unwrap())
-                .collect();
+        for parts in [1, 2, 3, 7, 16] {
+            let starts = starts(n, key, parts).unwrap();
+            let mut grouped = vec![0; n];
+            let chunks = words.chunks(KEYED_AT_A_TIME).zip(grouped.chunks_mut(KEYED_AT_A_TIME));
+            let ends: Vec<_> = chunks.map(|(words, to)| group(words, &starts, to)).collect();
+            let part = |k| sort_part(words_of(&grouped, &ends, k).unwrap(), key).unwrap();
+            let joined: Vec<u64> = (0..parts).flat_map(part).collect();
             assert!(joined == whole, "{parts} parts");
         }
+        // Words that begin a part, or are the greatest, belong to one part alone.
+        let words = [5 << INDEX_BITS, u64::MAX, 9 << INDEX_BITS, 0, 9 << INDEX_BITS | 7];
+        let mut grouped = [1; 5];
+        let ends = group(&words, &[5 << INDEX_BITS, 9 << INDEX_BITS], &mut grouped);
+        assert_eq!(grouped, [words[3], words[0], words[1], words[2], words[4]]);
+        assert_eq!(ends[..3], [1, 2, 5]);
     }
 
     /// The order of a curve through 8 cells, written out.

@@ -1,12 +1,15 @@
 //! Packs points and spheres whose positions are float32: their records hold these as they are.
+//! Boxes of float32 have a file of their own (`narrow_boxes.rs`).
 //!
 //! A position in float32 needs no second half and has no rest, so nothing is computed.
 //! Batches with a number that is invalid, or subnormal in float32, are packed as all others are
 //! (`batch.rs`).
 //! Both ways give the same bits.
 
+use crate::host::vectors::are_all;
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::aabb::Aabb;
+use crate::instances::narrow_boxes::Corners;
 use crate::instances::point::PointRecord;
 use crate::instances::volume_record::{LARGEST, SphereRecord};
 
@@ -14,11 +17,12 @@ use crate::instances::volume_record::{LARGEST, SphereRecord};
 pub(super) struct Fetched<const THREES: usize, const ONES: usize> {
     positions: [f32; THREES],
     radii: [f64; ONES],
+    corners: Corners<THREES>,
 }
 
 impl<const THREES: usize, const ONES: usize> Fetched<THREES, ONES> {
     pub(super) fn new() -> Self {
-        Self { positions: [0.0; THREES], radii: [0.0; ONES] }
+        Self { positions: [0.0; THREES], radii: [0.0; ONES], corners: Corners::new() }
     }
 
     /// Writes the records of the volumes `from`.
@@ -60,6 +64,9 @@ impl<const THREES: usize, const ONES: usize> Fetched<THREES, ONES> {
                     *record = bytemuck::cast(made);
                 }
             }
+            Bounds::Boxes { min: Floats::F32(min), max: Floats::F32(max) } => {
+                return self.corners.pack([min, max], from, indices, records);
+            }
             _ => return false,
         }
         true
@@ -71,6 +78,7 @@ impl<const THREES: usize, const ONES: usize> Fetched<THREES, ONES> {
         let positions = self.positions.as_chunks::<3>().0.iter().take(count);
         let positions = positions.map(|position| position.map(f64::from));
         match bounds {
+            Bounds::Boxes { .. } => self.corners.around(count),
             Bounds::Spheres { .. } => around_spheres(positions.zip(self.radii.iter().copied())),
             _ => around_spheres(positions.map(|position| (position, 0.0))),
         }
@@ -84,12 +92,6 @@ fn fetch<'a, const N: usize>(numbers: &[f32], from: &[usize], to: &'a mut [f32])
         to.copy_from_slice(&numbers[N * i..N * i + N]);
     }
     &to[..N * from.len()]
-}
-
-/// `all` without an early end, which would keep a compiler from making vectors.
-#[inline(always)]
-pub(super) fn are_all(each: impl Iterator<Item = bool>) -> bool {
-    each.fold(0_u32, |wrong, is_so| wrong | u32::from(!is_so)) == 0
 }
 
 /// `round_up` of numbers from 0 on.

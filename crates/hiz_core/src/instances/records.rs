@@ -9,6 +9,7 @@ use std::ops::Range;
 use crate::error::Result;
 use crate::gpu::buffers::{Mapped, entry};
 use crate::gpu::device::Gpu;
+use crate::gpu::kept::Ring;
 use crate::gpu::layouts::Binding;
 
 /// Records in a row of the texture.
@@ -33,6 +34,7 @@ const STORED: wgpu::TextureUsages =
 pub(crate) struct Records {
     pub(crate) view: wgpu::TextureView,
     texture: wgpu::Texture,
+    count: u32,
     record_bytes: u64,
 }
 
@@ -43,6 +45,8 @@ pub(crate) struct Upload {
     texture: wgpu::Texture,
     /// The rows of the texture that they are copied to.
     rows: Range<u32>,
+    /// Where the staging buffer goes when it has been read; then the copy is recorded once.
+    ring: Option<Ring>,
 }
 
 /// The most bytes that are staged at once, of records that are more.
@@ -53,6 +57,8 @@ const STAGED: u64 = 16 << 20;
 /// From this many bytes on, records are staged in several buffers.
 /// Fewer go through one, because a texture that is written in parts is cleared first.
 const MANY: u64 = 64 << 20;
+/// From this many bytes on, a staging buffer is kept for the next upload.
+const KEPT_FROM: u64 = 1 << 20;
 
 impl Records {
     /// Makes room for `count` records; `fill` writes them into mapped memory.
@@ -88,7 +94,7 @@ impl Records {
     ) -> Result<(Self, Upload, T)> {
         let records = Self::made(gpu, label, (count, record_bytes), texture_usage)?;
         let rows = 0..records.texture.height();
-        let (upload, filled) = records.staged(gpu, label, rows, fill)?;
+        let (upload, filled) = records.staged_by(gpu, label, rows, None, fill)?;
         Ok((records, upload, filled))
     }
 
@@ -100,6 +106,7 @@ impl Records {
     }
 
     /// Stages the records of some rows; `fill` writes them into mapped memory.
+    /// The upload's copy must be recorded at most once, since its buffer serves the next upload.
     pub(crate) fn staged<T>(
         &self,
         gpu: &Gpu,
@@ -108,10 +115,46 @@ impl Records {
         fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
     ) -> Result<(Upload, T)> {
         let size = self.row_bytes() * rows.len() as u64;
-        // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into this one.
-        let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
-        let (staging, filled) = gpu.written(label, size, usage, fill)?;
-        Ok((Upload { staging, texture: self.texture.clone(), rows }, filled))
+        let ring = if size < KEPT_FROM { None } else { Some(gpu.kept_staging(size)?) };
+        self.staged_by(gpu, label, rows.clone(), ring, |staged| {
+            let filled = fill(staged)?;
+            self.clear_padding(staged, &rows)?;
+            Ok(filled)
+        })
+    }
+
+    fn staged_by<T>(
+        &self,
+        gpu: &Gpu,
+        label: &str,
+        rows: Range<u32>,
+        ring: Option<Ring>,
+        fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
+    ) -> Result<(Upload, T)> {
+        let size = self.row_bytes() * rows.len() as u64;
+        let staging = match ring.as_ref().and_then(Ring::take) {
+            Some(free) => free,
+            None => {
+                // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into
+                // this one.
+                let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
+                gpu.mapped(label, size, usage)?
+            }
+        };
+        let filled = fill(&Mapped::of(label, &staging))?;
+        staging.unmap();
+        Ok((Upload { staging, texture: self.texture.clone(), rows, ring }, filled))
+    }
+
+    /// Zeroes what lies behind the last record, where a buffer still holds an older upload.
+    fn clear_padding(&self, mapped: &Mapped<'_>, rows: &Range<u32>) -> Result<()> {
+        let first = u64::from(rows.start) * u64::from(RECORDS_PER_ROW) * self.record_bytes;
+        let end = self.row_bytes() * rows.len() as u64;
+        let used = u64::from(self.count) * self.record_bytes - first;
+        if used < end {
+            mapped.range(used..end)?.slice(..).fill(0);
+        }
+        Ok(())
     }
 
     fn row_bytes(&self) -> u64 {
@@ -138,7 +181,7 @@ impl Records {
             texture_usage | wgpu::TextureUsages::COPY_DST,
         )?;
         let view = gpu.view(&texture)?;
-        Ok(Self { view, texture, record_bytes })
+        Ok(Self { view, texture, count, record_bytes })
     }
 
     /// The records in a row, of `count` in all.
@@ -181,6 +224,9 @@ impl Upload {
             },
             wgpu::Extent3d { height: self.rows.len() as u32, ..self.texture.size() },
         );
+        if let Some(ring) = &self.ring {
+            ring.come_back(encoder, &self.staging);
+        }
     }
 }
 
