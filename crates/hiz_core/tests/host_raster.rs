@@ -594,6 +594,7 @@ fn planted_faults_are_seen() {
         RasterFault::FarthestInTheMiddle,
         RasterFault::BoxesByTheirFarthest,
         RasterFault::RenewedTooNear,
+        RasterFault::RemaindersDropped,
         RasterFault::CellOfOneTile,
         RasterFault::NearUnclipped,
         RasterFault::GuardClamped,

@@ -21,6 +21,10 @@ pub(crate) const MAX_TRIANGLES: usize = 128;
 pub(crate) const MAX_VERTICES: usize = 128;
 /// How many vertices or triangles a loop treats at once: what a compiler turns into vectors.
 pub(crate) const LANES: usize = 8;
+/// A part of a meshlet: so many of its triangles, in groups of [`LANES`].
+///
+/// Parts have boxes of their own, for views where the meshlet takes much of the image.
+pub(crate) const PART_GROUPS: usize = 2;
 
 /// A cluster of triangles of one mesh.
 #[derive(Debug, Clone)]
@@ -36,10 +40,19 @@ pub(crate) struct Meshlet {
     pub(crate) num_vertices: u32,
     /// Where its triangles begin in [`Blocks::corners`], in groups of [`LANES`].
     pub(crate) first_group: u32,
+    /// Where the boxes of its parts begin in [`Blocks::parts`].
+    pub(crate) first_part: u32,
     /// Where its low halves begin, if any is not 0.
     pub(crate) first_low: Option<u32>,
     /// The areas of its triangles as seen along each axis, added up.
     pub(crate) facing: [f32; 3],
+}
+
+impl Meshlet {
+    /// Its triangles in groups of [`LANES`], from 0 on.
+    pub(crate) fn groups(&self) -> Range<u32> {
+        0..(self.triangles.len().div_ceil(LANES)) as u32
+    }
 }
 
 /// The vertices and triangles of all meshlets, as a rasteriser reads them.
@@ -51,13 +64,16 @@ pub(crate) struct Blocks {
     pub(crate) low: [Vec<f32>; 3],
     /// Corners of [`LANES`] triangles, as vertices of the meshlet's block.
     pub(crate) corners: Vec<[[u8; LANES]; 3]>,
+    /// The box around each part of a meshlet, in mesh coordinates: its corners `[min, max]`.
+    pub(crate) parts: Vec<[Vec3; 2]>,
 }
 
 impl Blocks {
     /// Bytes on the host.
     pub(crate) fn bytes(&self) -> u64 {
         let floats = self.high.iter().chain(&self.low).map(Vec::len).sum::<usize>();
-        (floats * size_of::<f32>() + size_of_val(&self.corners[..])) as u64
+        let triangles = size_of_val(&self.corners[..]) + size_of_val(&self.parts[..]);
+        (floats * size_of::<f32>() + triangles) as u64
     }
 }
 
@@ -130,6 +146,9 @@ pub(super) fn cluster(
     open.close(positions, first_triangle + triangles.len() as u32, meshlets, blocks)
 }
 
+/// Triangles of a part.
+const PART: usize = PART_GROUPS * LANES;
+
 /// The meshlet that is being filled.
 #[derive(Default)]
 struct Open {
@@ -197,6 +216,19 @@ impl Open {
                 .corners
                 .push(std::array::from_fn(|k| std::array::from_fn(|lane| corner(k, lane))));
         }
+        let first_part = blocks.parts.len() as u32;
+        memory::reserve(&mut blocks.parts, self.corners.len().div_ceil(PART), "meshlets")?;
+        for part in self.corners.chunks(PART) {
+            let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+            for corner in part.as_flattened() {
+                let p = positions[self.vertices[usize::from(*corner)] as usize];
+                for k in 0..3 {
+                    min[k] = min[k].min(p[k]);
+                    max[k] = max[k].max(p[k]);
+                }
+            }
+            blocks.parts.push([min, max]);
+        }
         meshlets.push(Meshlet {
             min,
             max,
@@ -204,6 +236,7 @@ impl Open {
             first_vertex,
             num_vertices: self.vertices.len() as u32,
             first_group,
+            first_part,
             first_low,
             facing,
         });
@@ -268,12 +301,15 @@ mod tests {
             next = m.triangles.end;
             assert!(m.triangles.len() <= MAX_TRIANGLES && m.num_vertices as usize <= MAX_VERTICES);
             for (i, t) in m.triangles.clone().enumerate() {
+                let [low, high] = blocks.parts[m.first_part as usize + i / PART];
                 let corners = blocks.corners[m.first_group as usize + i / LANES];
                 for (k, v) in triangles[t as usize - 10].iter().enumerate() {
                     let local = u32::from(corners[k][i % LANES]);
                     assert!(local < m.num_vertices);
                     for (axis, p) in positions[*v as usize].into_iter().enumerate() {
                         assert!((m.min[axis]..=m.max[axis]).contains(&p));
+                        assert!((low[axis]..=high[axis]).contains(&p));
+                        assert!(m.min[axis] <= low[axis] && high[axis] <= m.max[axis]);
                         let high = blocks.high[axis][(m.first_vertex + local) as usize];
                         let low = blocks.low[axis][(m.first_low.unwrap() + local) as usize];
                         assert!((f64::from(high) + f64::from(low) - p).abs() < 1e-13);

@@ -22,6 +22,11 @@ impl HostRaster {
         Self { raster: host_raster::HostRaster::new(size, bands), size }
     }
 
+    /// An image in as many bands as drawings on so many threads have outside of this module.
+    pub fn for_threads(size: ImageSize, threads: usize) -> Self {
+        Self { raster: host_raster::HostRaster::for_threads(size, threads), size }
+    }
+
     /// An image like [`HostRaster::new`], whose rasteriser has a planted fault.
     #[cfg(feature = "testing")]
     pub fn with_fault(size: ImageSize, bands: usize, fault: Option<RasterFault>) -> Self {

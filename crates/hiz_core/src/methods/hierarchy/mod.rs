@@ -261,8 +261,9 @@ impl HierarchicalVisibility {
         let start = Instant::now();
         flat.clear();
         let scene = self.scene(&copies, camera);
-        let drawn = flat.draw(&scene, way, &DrawOptions::default(), &Told::default())?;
+        let mut drawn = flat.draw(&scene, way, &DrawOptions::default(), &Told::default())?;
         let milliseconds = start.elapsed().as_secs_f64() * 1e3;
+        drawn.told.sort();
         let shown = drawn.told.shown();
         let meshlets = &self.surface.shapes().meshlets;
         let triangles = shown.iter().map(|(_, m)| meshlets[*m as usize].triangles.len() as u64);

@@ -331,8 +331,8 @@ impl Band {
             }
             return;
         }
-        let mut spans =
-            Spans::new(&edges.at(t, begin * STEP, first * STEP), edges, &steps, (begin, end));
+        let at = edges.at(t, begin * STEP, first * STEP);
+        let mut spans = Spans::new(&at, edges, &steps, (begin, end), self.image.fault);
         for row in first..=last {
             let [met, covered] = spans.row();
             spans.step_down();

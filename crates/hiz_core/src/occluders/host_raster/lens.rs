@@ -175,6 +175,14 @@ pub(crate) struct Extent {
     pub(crate) rows: (i32, i32),
 }
 
+impl Extent {
+    /// How many pixels lie in it.
+    pub(super) fn pixels(&self) -> i64 {
+        let side = |(first, last): (i32, i32)| i64::from(last - first + 1);
+        side(self.columns) * side(self.rows)
+    }
+}
+
 /// What may show of a box; `None` if it is surely outside the view.
 ///
 /// A box counts as hidden if its nearest point is behind what has been drawn.

@@ -63,7 +63,7 @@ use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::SIDE;
 use crate::occluders::host_raster::triangle::{End, Triangle, clipped};
 use crate::occluders::host_raster::vertices::Vertices;
-use crate::occluders::meshlets::Meshlet;
+use crate::occluders::meshlets::{LANES, Meshlet, PART_GROUPS};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
 use crate::occluders::view::View;
@@ -96,11 +96,13 @@ pub(crate) struct Way {
     pub(crate) skip: bool,
 }
 
-/// A meshlet of one copy that may show.
+/// A meshlet of one copy that may show, or a part of it.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     copy: u32,
     meshlet: u32,
+    /// Its triangles, in groups: the first one and the one after the last.
+    groups: (u32, u32),
     lens: u32,
     extent: Extent,
 }
@@ -121,9 +123,14 @@ pub(crate) struct Told {
 }
 
 impl Told {
+    /// Sorts the lists, in which a meshlet that was drawn in parts is more than once before.
+    ///
+    /// One of which a part was drawn and a part was skipped stays in both.
     pub(crate) fn sort(&mut self) {
-        self.shown.sort_unstable();
-        self.hidden.sort_unstable();
+        for list in [&mut self.shown, &mut self.hidden] {
+            list.sort_unstable();
+            list.dedup();
+        }
     }
 
     /// The meshlets that were drawn.
@@ -200,12 +207,14 @@ impl HostRaster {
         if options.is_limited() {
             candidates = within_limits(scene.shapes, &lenses, candidates, options, last);
         }
+        let mut candidates = self.in_parts(scene.shapes, &lenses, candidates)?;
         // Positive floats are ordered like their bits.
-        candidates.sort_unstable_by_key(|c| (!c.extent.nearest.to_bits(), c.lens, c.meshlet));
+        candidates
+            .sort_unstable_by_key(|c| (!c.extent.nearest.to_bits(), c.lens, c.meshlet, c.groups));
         let image = self.image;
         let faces = scene.cull_mode.as_seen_by(scene.camera);
         let drawn: Vec<AtomicBool> = candidates.iter().map(|_| AtomicBool::new(false)).collect();
-        let threads = way.threads.unwrap_or_else(|| worth_it(self.drawing_ns(scene, &candidates)));
+        let threads = way.threads.unwrap_or_else(|| worth_it(self.drawing_ns(&candidates)));
         on_threads(threads, &mut self.bands, |band: &mut Band| {
             let mut vertices = Vertices::new();
             for (candidate, drawn) in candidates.iter().zip(&drawn) {
@@ -238,9 +247,9 @@ impl HostRaster {
     }
 
     /// About how long one thread takes to draw the candidates, in nanoseconds.
-    fn drawing_ns(&self, scene: &Scene<'_>, candidates: &[Candidate]) -> u64 {
-        let triangles = |c: &Candidate| scene.shapes.meshlets[c.meshlet as usize].triangles.len();
-        let triangles: usize = candidates.iter().map(triangles).sum();
+    fn drawing_ns(&self, candidates: &[Candidate]) -> u64 {
+        let groups: u32 = candidates.iter().map(|c| c.groups.1 - c.groups.0).sum();
+        let triangles = LANES * groups as usize;
         // Many of the triangles are skipped, and most pixels are drawn once.
         10 * triangles as u64 + self.image.width as u64 * self.image.height as u64
     }
@@ -270,7 +279,9 @@ impl HostRaster {
                 let meshlet = &scene.shapes.meshlets[number as usize];
                 if let Some(extent) = extent(&lens, &self.image, meshlet.min, meshlet.max) {
                     let lens = lenses.len() as u32;
-                    candidates.push(Candidate { copy: *copy, meshlet: number, lens, extent });
+                    let groups = (0, meshlet.groups().end);
+                    let copy = *copy;
+                    candidates.push(Candidate { copy, meshlet: number, groups, lens, extent });
                 }
             }
             if candidates.len() > before {
@@ -278,6 +289,45 @@ impl HostRaster {
             }
         }
         Ok((lenses, candidates))
+    }
+
+    /// The candidates, of which those that take much of the image are split.
+    ///
+    /// Where triangles are large, each one that is skipped saves more than a box costs, and the
+    /// order from front to back matters.
+    fn in_parts(
+        &self,
+        shapes: &Shapes,
+        lenses: &[Lens],
+        candidates: Vec<Candidate>,
+    ) -> Result<Vec<Candidate>> {
+        let is_whole = |c: &Candidate| {
+            c.groups.1 <= PART_GROUPS as u32
+                || c.extent.pixels() < SPLIT_FROM * i64::from(c.groups.1) * LANES as i64
+        };
+        if candidates.iter().all(is_whole) {
+            return Ok(candidates);
+        }
+        let mut parts = memory::list(candidates.len(), "meshlets")?;
+        for candidate in candidates {
+            if is_whole(&candidate) {
+                memory::reserve(&mut parts, 1, "meshlets")?;
+                parts.push(candidate);
+                continue;
+            }
+            let meshlet = &shapes.meshlets[candidate.meshlet as usize];
+            let lens = &lenses[candidate.lens as usize];
+            let boxes = &shapes.blocks.parts[meshlet.first_part as usize..];
+            let firsts = (0..candidate.groups.1).step_by(PART_GROUPS);
+            memory::reserve(&mut parts, firsts.len(), "meshlets")?;
+            for (first, [min, max]) in firsts.zip(boxes) {
+                if let Some(extent) = extent(lens, &self.image, *min, *max) {
+                    let end = candidate.groups.1.min(first + PART_GROUPS as u32);
+                    parts.push(Candidate { groups: (first, end), extent, ..candidate });
+                }
+            }
+        }
+        Ok(parts)
     }
 
     /// Writes the image as NDC depth, row 0 on top, one number per pixel.
@@ -352,23 +402,21 @@ fn within_limits(
     last: &Told,
 ) -> Vec<Candidate> {
     let ranked = candidates.iter().map(|c| {
-        let side = |(first, last): (i32, i32)| (last - first + 1) as f32;
         let Meshlet { min, max, triangles, facing, .. } = &shapes.meshlets[c.meshlet as usize];
         let middle = std::array::from_fn(|k| 0.5 * (min[k] + max[k]));
         Ranked {
             copy: c.copy,
             triangles: triangles.len() as u32,
-            area: lenses[c.lens as usize].solid_angle(
-                *facing,
-                middle,
-                side(c.extent.columns) * side(c.extent.rows),
-            ),
+            area: lenses[c.lens as usize].solid_angle(*facing, middle, c.extent.pixels() as f32),
             last: last.of((c.copy, c.meshlet)),
         }
     });
     let is_kept = options.within_limits(&ranked.collect::<Vec<_>>());
     candidates.into_iter().zip(is_kept).filter_map(|(c, kept)| kept.then_some(c)).collect()
 }
+
+/// Meshlets are drawn in parts if so many pixels of their box come to each triangle.
+const SPLIT_FROM: i64 = 32;
 
 /// Triangles of a meshlet are sorted if so many pixels of its box come to each of them.
 const SORTED_FROM: i64 = 1024;
@@ -403,10 +451,9 @@ fn triangles_of(
     let mirrored = lens.mirrored && !is_planted!(image.fault, MirrorsIgnored);
     let faces = if mirrored { faces.reversed() } else { faces };
     vertices.project(&shapes.blocks, meshlet, lens, image);
-    vertices.select(&shapes.blocks, meshlet, faces, image, rows);
-    let side = |(first, last): (i32, i32)| i64::from(last - first + 1);
-    let pixels = side(candidate.extent.columns) * side(candidate.extent.rows);
-    if pixels > SORTED_FROM * vertices.num_kept() as i64 {
+    let groups = candidate.groups.0..candidate.groups.1;
+    vertices.select(&shapes.blocks, meshlet, groups, faces, image, rows);
+    if candidate.extent.pixels() > SORTED_FROM * vertices.num_kept() as i64 {
         vertices.sort(&shapes.blocks, meshlet);
     }
     for i in 0..vertices.num_kept() {

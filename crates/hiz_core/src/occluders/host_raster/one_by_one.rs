@@ -276,7 +276,9 @@ fn each_triangle(
     out: impl FnMut(&Triangle),
 ) {
     let (shapes, faces) = (looks.scene.shapes, looks.faces);
-    let candidate = Candidate { copy, meshlet, lens: 0, extent: *extent };
+    let groups = shapes.meshlets[meshlet as usize].groups();
+    let candidate =
+        Candidate { copy, meshlet, groups: (groups.start, groups.end), lens: 0, extent: *extent };
     let lens = looks.lens(copy, image);
     triangles_of(shapes, &candidate, lens, faces, image, rows, vertices, out);
 }

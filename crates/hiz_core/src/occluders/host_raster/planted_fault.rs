@@ -48,6 +48,8 @@ pub enum RasterFault {
     BoxesByTheirFarthest,
     /// The farthest depth of a tile with pixels is that of its nearest pixel.
     RenewedTooNear,
+    /// Quotients are carried from row to row without their remainders.
+    RemaindersDropped,
     /// A cell keeps the farthest depth of one tile.
     CellOfOneTile,
     /// Vertices before the near plane count as if they were on it.

@@ -68,7 +68,8 @@ impl<'a> Grid<'a> {
         let meshlet = &shapes.meshlets[meshlet as usize];
         let vertices = &mut *self.vertices;
         vertices.project(&shapes.blocks, meshlet, lens, image);
-        vertices.select(&shapes.blocks, meshlet, faces, image, (0, image.height - 1));
+        let (groups, rows) = (meshlet.groups(), (0, image.height - 1));
+        vertices.select(&shapes.blocks, meshlet, groups, faces, image, rows);
         for i in 0..vertices.num_kept() {
             let corners = vertices.corners(&shapes.blocks, meshlet, i);
             let projected = three(|k| vertices.projected(corners[k]));

@@ -3,6 +3,8 @@
 //! Both loops work on [`LANES`] at a time in arrays of fixed length, which compilers turn into
 //! vectors.
 
+use std::ops::Range;
+
 use crate::input::mesh::FaceCull;
 use crate::occluders::host_raster::lanes::three;
 use crate::occluders::host_raster::lens::{HALF, Image, LEAST_W, Lens, greatest, least, rounded};
@@ -112,19 +114,20 @@ impl Vertices {
         }
     }
 
-    /// Finds the triangles of `meshlet` that may cover a centre in rows `top..=bottom`.
+    /// Finds the triangles in `groups` of `meshlet` that may cover a centre in rows `top..=bottom`.
     #[inline(never)]
     pub(super) fn select(
         &mut self,
         blocks: &Blocks,
         meshlet: &Meshlet,
+        groups: Range<u32>,
         culled: FaceCull,
         image: &Image,
         (top, bottom): (i32, i32),
     ) {
         let count = meshlet.triangles.len();
-        let groups = count.div_ceil(LANES);
-        let corners = &blocks.corners[meshlet.first_group as usize..][..groups];
+        let corners = &blocks.corners[meshlet.first_group as usize..];
+        let corners = &corners[groups.start as usize..groups.end as usize];
         // Rows run downwards, so what is counter-clockwise with y up has a negative area here.
         let sign = match culled {
             FaceCull::None => 0.0,
@@ -133,7 +136,7 @@ impl Vertices {
         };
         let [half_x, half_y] = image.half;
         let mut kept = 0;
-        for (group, corners) in (0_u8..).zip(corners) {
+        for (group, corners) in (groups.start as u8..).zip(corners) {
             let of = |values: &PerVertex<f32>| {
                 corners.map(|c| c.map(|v| values[usize::from(v) % MAX_VERTICES]))
             };
