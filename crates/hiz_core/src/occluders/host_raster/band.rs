@@ -5,6 +5,7 @@
 
 use std::ops::{Range, RangeInclusive};
 
+use crate::host::vectors::widest;
 use crate::input::image::DepthConvention;
 use crate::occluders::host_raster::edges::{
     Edges, LARGE, STEP, Segment, Spans, Steps, bits, inside, to_pixels,
@@ -585,8 +586,14 @@ impl Band {
         convention: DepthConvention,
     ) {
         match convention {
-            DepthConvention::Reversed => self.write_as(out, pitch, rows, |nearness| nearness),
-            DepthConvention::Standard => self.write_as(out, pitch, rows, |nearness| 1.0 - nearness),
+            DepthConvention::Reversed => widest(
+                #[inline(always)]
+                || self.write_as(out, pitch, rows, |nearness| nearness),
+            ),
+            DepthConvention::Standard => widest(
+                #[inline(always)]
+                || self.write_as(out, pitch, rows, |nearness| 1.0 - nearness),
+            ),
         }
     }
 
