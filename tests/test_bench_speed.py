@@ -61,6 +61,8 @@ TARGETS = {
     "tiers.hidden0.1 tier, both ends": (0.5, False),
     "tiers.above.1 tier, both ends": (0.5, False),
     "tiers.hidden95.fewer.farthest end": (100.0, True),
+    "counts.0.25": (5.0, False),
+    "counts.1": (5.0, False),
     "cull.many.flat": (2.0, False),
     "cull.many.groups": (2.0, False),
     "calls.beyond": (1.0, False),

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -23,10 +23,10 @@ from hizvk.commands import pipes
 from hizvk.scenes.embree import can_cast, embree_scene
 from hizvk.scenes.scene import box_corners
 from hizvk.scenes.truth import RayCaster
+from tools.speed.counts import SPREADS, boxes_at_720p, milliseconds
+from tools.speed.rounds import in_turns
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import numpy.typing as npt
 
     from hizvk.scenes import Scene, View
@@ -38,6 +38,8 @@ LEAST_PIXELS = 16
 NUSCENES = (0.4, 0.6, 0.8)
 #: The pyramids that counts are timed with.
 DEPTHS: Final[tuple[Literal["farthest", "both"], ...]] = ("farthest", "both")
+#: Rounds of which the least counts.
+ROUNDS: Final = 25
 #: Corners of a box count as visible if they are at most this much behind the image, in metres.
 CORNER_DEPTH = 0.1
 
@@ -159,55 +161,35 @@ def measure(device: hizvk.Device, key: str, objects: int, views: int, castle: Pa
     return row
 
 
-def milliseconds(call: Callable[[], object]) -> float:
-    """CPU time of one call, of all threads: a busy machine changes it less than wall time."""
-    start = time.process_time()
-    call()
-    return 1e3 * (time.process_time() - start)
-
-
 def cost(
     device: hizvk.Device, spread: float, depths: Literal["farthest", "both"] = "farthest"
 ) -> list[str]:
     """2,000 boxes at 720p: CPU time of a cull with and without counts, in turns."""
-    random = np.random.default_rng(0)
-    count, size = 2000, (720, 1280)
-    camera = hizvk.Camera.look_at((0, 2, 0), (0, 2, -1), fov_y_deg=60, size=size, near=0.1)
-    center = np.c_[
-        random.uniform(-40, 40, count), random.uniform(0, 3, count), random.uniform(-80, -5, count)
-    ]
-    half = spread * random.uniform(0.3, 1.2, (count, 3))
-    walls = hizvk.Boxes(center[::4] - half[::4], center[::4] + half[::4])
-    corners = box_corners(walls.min, walls.max)
-    faces = np.array([[0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5], [4, 5, 7], [4, 7, 6]])
-    mesh = (
-        corners.reshape(-1, 3),
-        (faces + 8 * np.arange(len(corners))[:, None, None]).reshape(-1, 3),
-    )
-    depth = device.render_depth(device.occluders(*mesh), camera)
-    pyramid = device.pyramid(depth, depths=depths)
-    boxes = device.instances(hizvk.Boxes(center - half, center + half))
+    bounds, depth = boxes_at_720p(device, spread)
+    boxes, pyramid = device.instances(bounds), device.pyramid(depth, depths=depths)
     cells = []
     for name, options in (
         ("plain", hizvk.CullOptions()),
         ("exact", hizvk.CullOptions(fit="volume", descent=4096)),
     ):
-        without: list[float] = []
-        with_counts: list[float] = []
 
-        def plain(options: hizvk.CullOptions = options) -> object:
-            return device.cull(boxes, camera, pyramid, options, ["mask"]).mask
+        def call(
+            outputs: list[Literal["mask", "pixels"]], options: hizvk.CullOptions = options
+        ) -> object:
+            seen = device.cull(boxes, depth.camera, pyramid, options, outputs)
+            return seen.pixels if "pixels" in outputs else seen.mask
 
-        def counting(options: hizvk.CullOptions = options) -> object:
-            return device.cull(boxes, camera, pyramid, options, ["mask", "pixels"]).pixels
-
-        for _ in range(15):
-            without.append(milliseconds(plain))
-            with_counts.append(milliseconds(counting))
-        ratio = np.min(with_counts) / np.min(without)
-        cells.append(f"{name}: {np.min(without):.2f} ms, {np.min(with_counts):.2f} ms, {ratio:.1f}")
-    touched = device.cull(boxes, camera, pyramid, outputs=["pixels"]).pixels["touched"].sum()
-    return [f"{touched / count:,.0f} px per box, {depths}", *cells]
+        ms = in_turns(
+            {
+                "without": partial(milliseconds, partial(call, ["mask"])),
+                "with": partial(milliseconds, partial(call, ["mask", "pixels"])),
+            },
+            ROUNDS,
+        )
+        least, most = ms["without"].min(), ms["with"].min()
+        cells.append(f"{name}: {least:.2f} ms, {most:.2f} ms, {most / least:.1f}")
+    touched = device.cull(boxes, depth.camera, pyramid, outputs=["pixels"]).pixels["touched"].sum()
+    return [f"{touched / len(bounds.min):,.0f} px per box, {depths}", *cells]
 
 
 def main() -> None:
@@ -232,7 +214,7 @@ def main() -> None:
             print("| " + " | ".join(row.cells()) + " |", flush=True)
     else:
         print("no truth: embreex is not installed (pip install embreex)")
-    for spread in (0.25, 1.0):
+    for spread in SPREADS:
         for depths in DEPTHS:
             print(*cost(device, spread, depths), sep="; ", flush=True)
 

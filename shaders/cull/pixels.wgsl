@@ -1,35 +1,30 @@
 // Counts of pixels: in how many pixels of the depth image a volume is hidden, in how many one looks
 // through it, and in how many neither is certain.
 //
-// It is a pass of its own behind the cull.
-// First each invocation of a workgroup prepares one instance.
-// Its rectangle is cut into tiles, and then the invocations share the tiles of all of them.
+// It is a pass of its own behind the cull, with two dispatches.
+// In the first one, `count_of_pixels`, an invocation looks at all pixels of a small rectangle.
+// Large rectangles are listed for the second one, which is in `pixels_large.wgsl`.
 //
 // What is used here and defined elsewhere:
 //
 // - `pixels_planes.wgsl`, `pixels_planes_box.wgsl`, `pixels_planes_any.wgsl`: `PixelPlanes`,
 //   `fill_planes`
-// - `pixels_walk.wgsl`: `count_tile`
+// - `pixels_look.wgsl`: `look_at_pixels`
 // - `classify.wgsl`: `pixel_interval`, `between_samples`, `inside_block`
+
+// Invocations of a workgroup, and its instances, which are ordered by the size of their rectangles.
+// Twin: `WORKGROUP` in `crates/hiz_core/src/cull/pixels.rs`.
+const WORKGROUP: u32 = 128u;
+
+// A rectangle is large if it has more groups of four pixels of a row.
+const SMALL_ROWS: u32 = 1023u;
+// Rectangles are ordered by classes of their sizes, so that neighbours take about as long.
+// There are four classes per power of two of the number of groups.
+const CLASSES_LOG2: u32 = 2u;
+const CLASSES: u32 = 40u;
 
 // True: set the bit of each instance that may show in more than a negligible number of pixels.
 override SHOWN: bool;
-
-// Invocations of a workgroup, and the instances that they prepare.
-// Their planes fit the 16 KiB that WebGPU promises a workgroup.
-// Twin: `WORKGROUP` in `crates/hiz_core/src/cull/pixels.rs`.
-const WORKGROUP: u32 = 32u;
-
-// A rectangle of at most this many pixels is one tile.
-const ONE_TILE: u32 = 1024u;
-// Otherwise tiles have at least this side, as a power of two, and there are at most MAX_TILES.
-const TILE_LOG2: u32 = 5u;
-const MAX_TILES: u32 = 16u;
-const WHOLE_IMAGE_LOG2: u32 = 15u;
-
-// Tiles are ordered by classes of their sizes, so that neighbours take about as long.
-// There are two per power of two of the number of rows of four pixels.
-const CLASSES: u32 = 16u;
 
 // Twin: `PixelCounts` in `crates/hiz_core/src/output/pixels.rs`.
 struct PixelCounts {
@@ -54,6 +49,8 @@ struct Counting {
 @group(2) @binding(0) var<storage, read_write> counts: array<PixelCounts>;
 @group(2) @binding(1) var<storage, read_write> shown: array<atomic<u32>>;
 @group(2) @binding(2) var<uniform> counting: Counting;
+// How many instances have large rectangles, and which.
+@group(2) @binding(3) var<storage, read_write> large: array<atomic<u32>>;
 
 // Nothing is known about so many pixels.
 fn unknown(pixels: u32) -> PixelCounts {
@@ -74,7 +71,8 @@ fn answered(counts: PixelCounts) -> Prepared {
     return Prepared(counts, vec4<u32>(0u), false);
 }
 
-fn prepare(i: u32, planes: ptr<function, PixelPlanes>) -> Prepared {
+// The rectangle of an instance; `projected` is what its planes come from.
+fn rectangle_of(i: u32, projected: ptr<function, Projected>) -> Prepared {
     let none = PixelCounts(0u, 0u, 0u, 0u, 0u);
     let everything = unknown(u32(view.size.x) * u32(view.size.y));
     let volume = load_volume(i);
@@ -124,64 +122,77 @@ fn prepare(i: u32, planes: ptr<function, PixelPlanes>) -> Prepared {
             if !is_reduced {
                 return answered(unknown((l.x - f.x + 1u) * (l.y - f.y + 1u)));
             }
-            let first_edge = vec2<f32>(f) - view.reach - view.half_size;
-            let last_edge = vec2<f32>(l + vec2<u32>(1u)) + view.reach - view.half_size;
-            let most = max(abs(first_edge), abs(last_edge));
-            fill_planes(planes, Projected(x, y, z, w, w_min), most);
+            *projected = Projected(x, y, z, w, w_min);
             return Prepared(none, vec4<u32>(f, l), true);
         }
     }
     return answered(everything);
 }
 
-// How a rectangle is cut into tiles.
-struct Tiling {
-    // Tiles begin at multiples of 2^log2 pixels.
-    log2: u32,
-    columns: u32,
-    // The number of the first tile among those of the workgroup, and how many there are.
-    begin: u32,
-    count: u32,
+// The rectangle of an instance, and its planes.
+fn prepare(i: u32, planes: ptr<function, PixelPlanes>) -> Prepared {
+    var projected: Projected;
+    let prepared = rectangle_of(i, &projected);
+    let r = prepared.rectangle;
+    let first_edge = vec2<f32>(r.xy) - view.reach - view.half_size;
+    let last_edge = vec2<f32>(r.zw + vec2<u32>(1u)) + view.reach - view.half_size;
+    fill_planes(planes, projected, max(abs(first_edge), abs(last_edge)));
+    return prepared;
 }
 
-// The class of a rectangle, or of one of its tiles if there are several.
-fn size_class(r: vec4<u32>, tiles: Tiling) -> u32 {
-    if tiles.count > 1u {
-        return CLASSES - 1u;
-    }
-    let rows = ((r.z >> VECTOR_LOG2) - (r.x >> VECTOR_LOG2) + 1u) * (r.w - r.y + 1u);
+// How many groups of four pixels of a row a rectangle meets.
+fn rows_of_four(r: vec4<u32>) -> u32 {
+    return ((r.z >> VECTOR_LOG2) - (r.x >> VECTOR_LOG2) + 1u) * (r.w - r.y + 1u);
+}
+
+// The class of a small rectangle; the largest ones come first.
+fn size_class(rows: u32) -> u32 {
     let bit = leading_bit(rows);
-    return min(((2u * rows) >> bit) + 2u * bit - 2u, CLASSES - 1u);
+    let part = ((rows << CLASSES_LOG2) >> bit) - (1u << CLASSES_LOG2);
+    return CLASSES - 1u - (part + (bit << CLASSES_LOG2));
 }
 
-fn tiling(r: vec4<u32>) -> Tiling {
-    let sides = r.zw - r.xy + vec2<u32>(1u);
-    if sides.x * sides.y <= ONE_TILE {
-        return Tiling(WHOLE_IMAGE_LOG2, 1u, 0u, 1u);
+fn write_counts(i: u32, found: PixelCounts) {
+    let index = caller_index(i);
+    counts[index] = found;
+    if SHOWN {
+        let may_show = found.touched - found.hidden > counting.negligible;
+        let bit = select(0u, 1u << (index % WORD_BITS), may_show);
+        // Mesa 22.3 crashes in compiling a branch around the atomic.
+        atomicOr(&shown[index / WORD_BITS], bit);
     }
-    var log2 = TILE_LOG2;
+}
+
+// Looks at the pixels of a small rectangle, one row after the other.
+fn count_small(planes: ptr<function, PixelPlanes>, r: vec4<u32>) -> PixelCounts {
+    var walk = Walk(0u, 0u, 0u, 0u);
+    var left = counting.budget;
+    let begin = r.x >> VECTOR_LOG2;
+    var at = vec2<u32>(begin, r.y);
+    var depths = read_depths(at);
     loop {
-        let tiles = (r.zw >> vec2<u32>(log2)) - (r.xy >> vec2<u32>(log2)) + vec2<u32>(1u);
-        if tiles.x * tiles.y <= min(MAX_TILES, counting.budget) {
-            return Tiling(log2, tiles.x, 0u, tiles.x * tiles.y);
+        left -= 1u;
+        var next = at + vec2<u32>(1u, 0u);
+        if VECTOR * next.x > r.z {
+            next = vec2<u32>(begin, at.y + 1u);
         }
-        log2 += 1u;
+        // They are read ahead, so that the device need not wait for them.
+        let ahead = read_depths(next);
+        look_at_pixels(planes, at, depths, r, &walk);
+        at = next;
+        depths = ahead;
+        continuing {
+            break if at.y > r.w || left == 0u;
+        }
     }
-    return Tiling(WHOLE_IMAGE_LOG2, 1u, 0u, 1u);
+    return counts_of(walk, r);
 }
 
-// Of the instances of a workgroup.
-var<workgroup> all_planes: array<PixelPlanes, WORKGROUP>;
-var<workgroup> rectangles: array<vec4<u32>, WORKGROUP>;
-var<workgroup> tilings: array<Tiling, WORKGROUP>;
-var<workgroup> hidden_sums: array<atomic<u32>, WORKGROUP>;
-var<workgroup> inside_sums: array<atomic<u32>, WORKGROUP>;
-var<workgroup> open_sums: array<atomic<u32>, WORKGROUP>;
-var<workgroup> undecided_sums: array<atomic<u32>, WORKGROUP>;
-// Of each tile: whose it is.
-var<workgroup> owners: array<u32, WORKGROUP * MAX_TILES>;
-// Of each class of sizes: how many tiles there are.
-var<workgroup> class_counts: array<atomic<u32>, CLASSES>;
+// Of each class: how many rectangles there are, and then where they begin.
+var<workgroup> classes: array<atomic<u32>, CLASSES>;
+var<workgroup> small_count: u32;
+// The instances with small rectangles, by class.
+var<workgroup> small: array<u32, WORKGROUP>;
 
 @compute @workgroup_size(WORKGROUP)
 fn count_of_pixels(
@@ -189,75 +200,52 @@ fn count_of_pixels(
 ) {
     begin();
     // The memory of a workgroup holds anything at first.
-    atomicStore(&hidden_sums[lane], 0u);
-    atomicStore(&inside_sums[lane], 0u);
-    atomicStore(&open_sums[lane], 0u);
-    atomicStore(&undecided_sums[lane], 0u);
     if lane < CLASSES {
-        atomicStore(&class_counts[lane], 0u);
+        atomicStore(&classes[lane], 0u);
     }
     workgroupBarrier();
-    var planes: PixelPlanes;
+    var projected: Projected;
     var own = answered(PixelCounts(0u, 0u, 0u, 0u, 0u));
-    let is_there = id.x < piece.count;
-    if is_there {
-        own = prepare(id.x, &planes);
-    }
-    var tiles: Tiling;
-    var own_class = 0u;
-    if own.is_open {
-        tiles = tiling(own.rectangle);
-        own_class = size_class(own.rectangle, tiles);
-        tiles.begin = atomicAdd(&class_counts[own_class], tiles.count);
-    }
-    workgroupBarrier();
-    var count = 0u;
-    for (var k = 0u; k < CLASSES; k += 1u) {
-        let of_class = atomicLoad(&class_counts[k]);
-        tiles.begin += select(0u, of_class, k < own_class);
-        count += of_class;
-    }
-    if own.is_open {
-        all_planes[lane] = planes;
-        rectangles[lane] = own.rectangle;
-        tilings[lane] = tiles;
-        for (var k = 0u; k < tiles.count; k += 1u) {
-            owners[tiles.begin + k] = lane;
+    if id.x < piece.count {
+        own = rectangle_of(id.x, &projected);
+        if !own.is_open {
+            write_counts(id.x, own.counts);
         }
     }
-    workgroupBarrier();
-    for (var t = lane; t < count; t += WORKGROUP) {
-        let owner = owners[t];
-        planes = all_planes[owner];
-        let r = rectangles[owner];
-        let cut = tilings[owner];
-        let k = t - cut.begin;
-        let at = (r.xy >> vec2<u32>(cut.log2)) + vec2<u32>(k % cut.columns, k / cut.columns);
-        let first = max(at << vec2<u32>(cut.log2), r.xy);
-        let last = min(((at + vec2<u32>(1u)) << vec2<u32>(cut.log2)) - vec2<u32>(1u), r.zw);
-        let found = count_tile(&planes, first, last, counting.budget / cut.count);
-        atomicAdd(&hidden_sums[owner], found.hidden);
-        atomicAdd(&inside_sums[owner], found.inside);
-        atomicAdd(&open_sums[owner], found.open);
-        atomicAdd(&undecided_sums[owner], found.undecided);
+    let rows = rows_of_four(own.rectangle);
+    let is_small = own.is_open && rows <= SMALL_ROWS;
+    var class_here = 0u;
+    var place = 0u;
+    if is_small {
+        class_here = size_class(rows);
+        place = atomicAdd(&classes[class_here], 1u);
+    } else if own.is_open {
+        atomicStore(&large[1u + atomicAdd(&large[0], 1u)], id.x);
     }
     workgroupBarrier();
-    if is_there {
-        var found = own.counts;
-        if own.is_open {
-            found.hidden = atomicLoad(&hidden_sums[lane]);
-            found.inside = atomicLoad(&inside_sums[lane]);
-            found.open = atomicLoad(&open_sums[lane]);
-            found.undecided = atomicLoad(&undecided_sums[lane]);
-            found.touched = found.hidden + found.inside + found.open;
+    if lane == 0u {
+        var sum = 0u;
+        for (var k = 0u; k < CLASSES; k += 1u) {
+            let of_class = atomicLoad(&classes[k]);
+            atomicStore(&classes[k], sum);
+            sum += of_class;
         }
-        let index = caller_index(id.x);
-        counts[index] = found;
-        if SHOWN {
-            let may_show = found.touched - found.hidden > counting.negligible;
-            let bit = select(0u, 1u << (index % WORD_BITS), may_show);
-            // Mesa 22.3 crashes in compiling a branch around the atomic.
-            atomicOr(&shown[index / WORD_BITS], bit);
+        small_count = sum;
+    }
+    workgroupBarrier();
+    if is_small {
+        small[atomicLoad(&classes[class_here]) + place] = id.x;
+    }
+    workgroupBarrier();
+    if lane < small_count {
+        var planes: PixelPlanes;
+        let i = small[lane];
+        // A compiler may fuse what is computed anew in another way, so all of it is taken from here.
+        let prepared = prepare(i, &planes);
+        var found = prepared.counts;
+        if prepared.is_open {
+            found = count_small(&planes, prepared.rectangle);
         }
+        write_counts(i, found);
     }
 }

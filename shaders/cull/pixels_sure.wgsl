@@ -22,16 +22,16 @@ fn all_sanitized(bits: vec4<u32>) -> vec4<u32> {
 // How far stored depths are at most, and at least, as `surely_clear` compares them.
 // They are measured from z_slope, and raised by the margin of the comparison.
 fn hiding_bounds(bits: vec4<u32>) -> vec4<f32> {
-    let given = bitcast<vec4<f32>>(bits);
-    let stored =
-        select(max(given, vec4<f32>(LEAST_NORMAL)), min(given, vec4<f32>(1.0)), REVERSED);
+    // Depths are at least 0, so their bits are ordered as they are.
+    let stored = bitcast<vec4<f32>>(select(
+        max(bits, vec4<u32>(LEAST_NORMAL_BITS)), min(bits, vec4<u32>(ONE_BITS)), REVERSED));
     let moved = bar4(stored * view.depth_factor + view.depth_offset);
     return with_margin(farther_sign() * bar4(moved - view.z_slope));
 }
 
 fn opening_bounds(bits: vec4<u32>) -> vec4<f32> {
-    let given = bitcast<vec4<f32>>(bits);
-    let stored = select(given, max(given, vec4<f32>(LEAST_NORMAL)), REVERSED);
+    let stored = bitcast<vec4<f32>>(
+        select(bits, max(bits, vec4<u32>(LEAST_NORMAL_BITS)), REVERSED));
     let moved = bar4(stored * view.near_factor + view.near_offset);
     return with_margin(-farther_sign() * bar4(moved - view.z_slope));
 }
@@ -58,6 +58,12 @@ struct Place {
     bottom: f32,
 }
 
+// `clamp`, without the care for NaN that it takes on some devices.
+fn within(x: f32, low: vec4<f32>, high: vec4<f32>) -> vec4<f32> {
+    let raised = select(low, vec4<f32>(x), low < vec4<f32>(x));
+    return select(high, raised, raised < high);
+}
+
 // The place of the pixels from `begin` to before `end`.
 fn place_of(
     planes: ptr<function, PixelPlanes>, begin: vec4<u32>, end: vec4<u32>, rows: vec2<u32>,
@@ -70,7 +76,7 @@ fn place_of(
     let left_top = (*planes).left_top;
     let right_bottom = (*planes).right_bottom;
     return Place(
-        clamp(vec4<f32>(left_top.x), low, high), clamp(vec4<f32>(right_bottom.x), low, high),
+        within(left_top.x, low, high), within(right_bottom.x, low, high),
         clamp(left_top.y, low_y, high_y), clamp(right_bottom.y, low_y, high_y));
 }
 
@@ -80,38 +86,46 @@ fn least_over(offset: f32, slope: vec2<f32>, at: Place) -> vec4<f32> {
     return vec4<f32>(row) - slope.x * select(at.left, at.right, slope.x > 0.0);
 }
 
-// How far each texel's nearest pixel is beyond the outline, and its farthest one at most.
+// Which texels have a pixel, and which have only pixels, that a plane of the outline excludes.
+struct Outline {
+    some: vec4<bool>,
+    all: vec4<bool>,
+}
+
 // No texel is wider or higher than `side`.
-fn beyond(planes: ptr<function, PixelPlanes>, at: Place, side: f32) -> array<vec4<f32>, 2> {
-    var nearest = vec4<f32>(NO_PLANE);
-    var farthest = vec4<f32>(NO_PLANE);
+fn outline_of(planes: ptr<function, PixelPlanes>, at: Place, side: f32) -> Outline {
+    var outline = Outline(vec4<bool>(false), vec4<bool>(false));
     for (var i = 0u; i < OUTLINE_PLANES; i += 1u) {
         let slope = (*planes).outline_slopes[i];
         let least = least_over((*planes).outlines[i], slope, at);
-        nearest = max(nearest, least);
-        farthest = max(farthest, least + vec4<f32>(dot(abs(slope), vec2<f32>(side))));
+        let most = least + vec4<f32>(dot(abs(slope), vec2<f32>(side)));
+        outline.some = outline.some | most > vec4<f32>(TEXEL_FLOOR);
+        outline.all = outline.all | least > vec4<f32>(TEXEL_FLOOR);
     }
-    return array<vec4<f32>, 2>(nearest, farthest);
+    return outline;
 }
 
-// What the depths of four texels say; `outside` is how far they are beyond the outline.
+// What the depths of four texels say; `outside`: a plane of the outline excludes all their pixels.
+//
+// Bounds are compared one by one, which takes less than the greatest of them.
 fn sure_of(
-    planes: ptr<function, PixelPlanes>, at: Place, outside: vec4<f32>, raw: vec4<u32>,
+    planes: ptr<function, PixelPlanes>, at: Place, outside: vec4<bool>, raw: vec4<u32>,
     near: vec4<u32>,
 ) -> Sure {
-    // How far the volume is at least over each texel, and at most.
-    var front = vec4<f32>((*planes).front);
-    var back = vec4<f32>((*planes).back);
+    let surface = hiding_bounds(all_sanitized(raw));
+    let near_surface = opening_bounds(all_sanitized(near));
+    // Whether the volume is farther at least, or nearer at most.
+    var hidden = vec4<f32>((*planes).front) > surface;
+    var before = vec4<f32>((*planes).back) > near_surface;
     for (var i = 0u; i < FACE_PLANES; i += 1u) {
         let plane = (*planes).faces[i];
-        front = max(front, least_over(plane.z, plane.xy, at));
-        back = max(back, least_over(plane.w, select(plane.xy, -plane.xy, TWO_SIDED), at));
+        let back = select(plane.xy, -plane.xy, TWO_SIDED);
+        hidden = hidden | least_over(plane.z, plane.xy, at) > surface;
+        before = before | least_over(plane.w, back, at) > near_surface;
     }
-    let hidden = front > hiding_bounds(all_sanitized(raw));
     // Background hides nothing, however far the volume is.
     let is_background = near == vec4<u32>(far_bits());
-    let open = are_depths(near) & (is_background | back > opening_bounds(all_sanitized(near)));
+    let open = are_depths(near) & (is_background | before);
     // Nothing of the volume is there if it would have to be behind the surface and in front of it.
-    return Sure(outside > vec4<f32>(TEXEL_FLOOR) | (hidden & open), hidden, open);
+    return Sure(outside | (hidden & open), hidden, open);
 }
-

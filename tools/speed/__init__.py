@@ -10,6 +10,7 @@ From a checkout with the module built for release: ``python -m tools.speed``.
 - `depth_in`: multisampled depth, and rectangles that have changed
 - `mips`: mip textures of depth against the pyramid
 - `culling`: certified, uncertified and grouped culls; what each output costs
+- `counts`: counts of pixels against the cull without them
 - `errors`: what the culls keep, against the float64 oracle
 - `calls`: what Python adds; small calls; numpy and Embree
 - `occluders`: the host's rasteriser against the device's, and conservative depth

@@ -264,9 +264,31 @@ fn counts_are_an_output_of_their_own() {
     assert!(refused.unwrap_err().to_string().contains("without pixels"));
 }
 
+/// Rectangles of every size are counted by the way of large ones: from coarse levels on.
+const ALL_ARE_LARGE: (&str, &str) =
+    ("const SMALL_ROWS: u32 = 1023u;", "const SMALL_ROWS: u32 = 0u;");
+
+#[test]
+fn large_rectangles_count_like_small_ones() {
+    let engine = Engine::with_planted_faults(None, &[ALL_ARE_LARGE]).expect("a Vulkan driver");
+    for coverage in [Coverage::Area, Coverage::Sample] {
+        let rounds = campaign(76, 1, coverage).fitted(&KINDS, false).take(60);
+        assert_eq!(run(&engine, rounds, None).contradictions, 0, "{coverage:?}");
+    }
+    let rounds = campaign(77, 1, Coverage::Area).fitted(&KINDS, false).take(30);
+    assert_eq!(run(&engine, rounds, Some(20)).contradictions, 0);
+    for levels in campaign::MISSING_LEVELS {
+        let rounds = campaign(78, 1, Coverage::Area)
+            .fitted(&KINDS, false)
+            .take(8)
+            .map(|round| Round { levels: *levels, ..round });
+        assert_eq!(run(&engine, rounds, None).contradictions, 0, "{levels:?}");
+    }
+}
+
 #[test]
 fn planted_faults_turn_it_red() {
-    let planted: [(&str, &[(&str, &str)]); 5] = [
+    let planted: [(&str, &[(&str, &str)]); 7] = [
         (
             "an edge pixel dropped",
             &[(
@@ -286,11 +308,19 @@ fn planted_faults_turn_it_red() {
         ),
         (
             "a texel's pixels outside the rectangle counted",
-            &[(
-                "max(columns << vec4<u32>(level), vec4<u32>(first.x))",
-                "columns << vec4<u32>(level)",
-            )],
+            &[
+                ALL_ARE_LARGE,
+                (
+                    "max(columns << vec4<u32>(level), vec4<u32>(first.x))",
+                    "columns << vec4<u32>(level)",
+                ),
+            ],
         ),
+        (
+            "another texel entered",
+            &[ALL_ARE_LARGE, ("| (VECTOR * at.x + k);", "| (VECTOR * at.x);")],
+        ),
+        ("the depths of the row before", &[("depths = ahead;", "")]),
         (
             "the front taken for the back",
             &[(

@@ -20,12 +20,23 @@ use crate::input::bounds::BoundsKind;
 use crate::instances::piece::RECORD_BINDINGS;
 use crate::output::visible::Visible;
 
-/// Invocations of a workgroup, and the instances that it prepares; `shaders/cull/pixels.wgsl`.
-pub(crate) const WORKGROUP: u32 = 32;
+/// Invocations of a workgroup, and its instances; `shaders/cull/pixels.wgsl`.
+pub(crate) const WORKGROUP: u32 = 128;
 
-/// What a count writes: the counts, the mask of what is not negligible, and the numbers it reads.
+/// Invocations that count a large rectangle together; `shaders/cull/pixels_large.wgsl`.
+pub(crate) const TEAM: u32 = 8;
+
+/// Workgroups that share the large rectangles out among them, at most.
+/// On a processor each costs time, and there are few threads to take them.
+fn most_teams(gpu: &Gpu) -> u32 {
+    if gpu.is_processor() { 16 } else { 1024 }
+}
+
+/// What a count writes: the counts, the mask of what is not negligible, and the list of large
+/// rectangles.
+/// Number 2 are the numbers that it reads.
 const COUNTED_BINDINGS: &[(u32, Binding)] =
-    &[(0, Binding::Write), (1, Binding::Write), (2, Binding::Uniform)];
+    &[(0, Binding::Write), (1, Binding::Write), (2, Binding::Uniform), (3, Binding::Write)];
 
 /// Twin: `shaders/cull/pixels.wgsl`, `Counting`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -63,8 +74,9 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
         planes,
         wgsl!("cull/pixels_planes"),
         wgsl!("cull/pixels_sure"),
-        wgsl!("cull/pixels_walk"),
+        wgsl!("cull/pixels_look"),
         wgsl!("cull/pixels"),
+        wgsl!("cull/pixels_large"),
     ];
     unexplained(store, kind, Decision::Seen, &[&row[..], alone, &count].concat())
 }
@@ -73,12 +85,13 @@ fn pixels_pipeline(
     gpu: &Gpu,
     key: &CullKey,
     (one_sample, shown): (bool, bool),
+    entry_point: &'static str,
 ) -> Result<wgpu::ComputePipeline> {
     let written = ("hiz.pixels.layout", COUNTED_BINDINGS);
     gpu.compute_pipeline(&Compute {
         label: "hiz.pixels.pipeline",
         source: pixels_module(key.store, key.kind),
-        entry_point: "count_of_pixels",
+        entry_point,
         layouts: &layouts(gpu, key.store, RECORD_BINDINGS, written)?,
         constants: &pixels_constants(key, one_sample, shown),
     })
@@ -97,10 +110,20 @@ fn pixels_constants(key: &CullKey, one_sample: bool, shown: bool) -> Vec<(&'stat
 /// A count that is prepared: nothing that it records can fail any more.
 #[derive(Debug)]
 pub(crate) struct PixelPass {
-    pipeline: wgpu::ComputePipeline,
+    /// Of all instances, and of those with large rectangles.
+    pipelines: [wgpu::ComputePipeline; 2],
     view: BoundView,
-    /// Per piece: records, outputs, workgroups.
-    pieces: Vec<(wgpu::BindGroup, wgpu::BindGroup, u32)>,
+    pieces: Vec<CountedPiece>,
+}
+
+#[derive(Debug)]
+struct CountedPiece {
+    records: wgpu::BindGroup,
+    written: wgpu::BindGroup,
+    /// The list of large rectangles, whose first word is their number.
+    large: wgpu::Buffer,
+    /// Of each pipeline.
+    workgroups: [u32; 2],
 }
 
 impl PixelPass {
@@ -120,8 +143,11 @@ impl PixelPass {
         let CullInputs { instances, pyramid, .. } = *inputs;
         let seen = PreparedView::new(gpu, inputs, None)?;
         let view = seen.bind(gpu, pyramid, false)?;
-        let pipeline =
-            pixels_pipeline(gpu, &seen.key, (seen.has_one_sample(), negligible.is_some()))?;
+        let flags = (seen.has_one_sample(), negligible.is_some());
+        let pipelines = [
+            pixels_pipeline(gpu, &seen.key, flags, "count_of_pixels")?,
+            pixels_pipeline(gpu, &seen.key, flags, "count_of_many_pixels")?,
+        ];
         let counting = gpu.uniform(
             "hiz.pixels.counting",
             &CountingUniform {
@@ -133,6 +159,7 @@ impl PixelPass {
         let bound = |(p, piece): (usize, &crate::instances::piece::Piece)| {
             let output = &visible.pieces[p];
             let counts = output.pixels.as_ref().expect("the outputs have counts");
+            let large = output.large.clone().expect("a list beside the counts");
             check_alive(counts)?;
             let shown = match negligible {
                 Some(_) => output.mask.clone(),
@@ -146,13 +173,15 @@ impl PixelPass {
                     entry(0, counts.as_entire_binding()),
                     entry(1, shown.as_entire_binding()),
                     entry(2, counting.as_entire_binding()),
+                    entry(3, large.as_entire_binding()),
                 ],
             )?;
-            let workgroups = if inputs.idle { 0 } else { piece.count().div_ceil(WORKGROUP) };
-            Ok((records, written, workgroups))
+            let count = if inputs.idle { 0 } else { piece.count() };
+            let workgroups = [count.div_ceil(WORKGROUP), count.div_ceil(TEAM).min(most_teams(gpu))];
+            Ok(CountedPiece { records, written, large, workgroups })
         };
         let pieces = instances.pieces.iter().enumerate().map(bound).collect::<Result<_>>()?;
-        Ok(Some(Self { pipeline, view, pieces }))
+        Ok(Some(Self { pipelines, view, pieces }))
     }
 
     pub(crate) fn record(
@@ -161,13 +190,18 @@ impl PixelPass {
         pyramid: &crate::pyramid::Pyramid,
     ) {
         self.view.record(encoder, pyramid);
+        for piece in &self.pieces {
+            encoder.clear_buffer(&piece.large, 0, Some(4));
+        }
         let mut pass = stage_pass(encoder, "hiz.pixels.pass", "pixels");
-        pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.view.instances, &[]);
-        for (records, written, workgroups) in &self.pieces {
-            pass.set_bind_group(1, records, &[]);
-            pass.set_bind_group(2, written, &[]);
-            pass.dispatch_workgroups(*workgroups, 1, 1);
+        for (number, pipeline) in self.pipelines.iter().enumerate() {
+            pass.set_pipeline(pipeline);
+            for piece in &self.pieces {
+                pass.set_bind_group(1, &piece.records, &[]);
+                pass.set_bind_group(2, &piece.written, &[]);
+                pass.dispatch_workgroups(piece.workgroups[number], 1, 1);
+            }
         }
     }
 }

@@ -1,0 +1,236 @@
+// Counts of pixels in large rectangles: a workgroup counts one after the other.
+//
+// Coarse levels are walked as a descent walks, and what is open at the finest of them is looked at
+// pixel by pixel.
+// The texels that are left to enter are shared out among the invocations, so none waits for others.
+// Source: Greene, Kass and Miller, "Hierarchical Z-Buffer Visibility", SIGGRAPH 1993.
+//
+// What is used here and defined elsewhere:
+//
+// - `pixels.wgsl`: `prepare`, `write_counts`, `large`
+// - `pixels_look.wgsl`: `look_at_texels`, `look_at_pixels`
+
+// Invocations of a workgroup, which count one rectangle together.
+// Twin: `TEAM` in `crates/hiz_core/src/cull/pixels.rs`.
+const TEAM: u32 = 8u;
+
+// Of coarse levels every other one is read.
+// So the children of a texel are four rows of four.
+const STEP: u32 = 2u;
+const CHILD_ROWS: u32 = 1u << STEP;
+
+// So many rows of four texels are looked at between two barriers, at most.
+const CHUNK: u32 = 64u;
+// So many texels they leave to enter, at most.
+const LISTED: u32 = VECTOR * CHUNK;
+// A list for each level that is read.
+const LISTS: u32 = MAX_LEVELS / STEP;
+// A texel's column and row fit one word: the level is 2 or above, of at most 2^15 pixels.
+const ROW_SHIFT: u32 = 16u;
+const COLUMN_MASK: u32 = (1u << ROW_SHIFT) - 1u;
+
+var<workgroup> large_here: u32;
+var<workgroup> rectangle: vec4<u32>;
+// The texels that are left to enter, of one level after the other from the finest one on.
+var<workgroup> lists: array<u32, LISTED * LISTS>;
+// How many texels have been listed, ever.
+var<workgroup> listed: atomic<u32>;
+var<workgroup> listed_here: u32;
+// What each invocation has counted.
+var<workgroup> parts: array<vec4<u32>, TEAM>;
+
+// A place of a row of four in an area that is `width` of them wide.
+fn place_in(t: u32, width: u32) -> vec2<u32> {
+    return vec2<u32>(t % width, t / width);
+}
+
+// The number, from left and from above, of a block of 4x4 pixels in the listed texels.
+// A texel has 4^sides_log2 of them.
+fn block_of(t: u32, sides_log2: u32) -> vec2<u32> {
+    let texel = lists[t >> (2u * sides_log2)];
+    let mask = (1u << sides_log2) - 1u;
+    let inner = vec2<u32>(t & mask, (t >> sides_log2) & mask);
+    return (vec2<u32>(texel & COLUMN_MASK, texel >> ROW_SHIFT) << vec2<u32>(sides_log2)) + inner;
+}
+
+// Counts the 4x4 pixels of a block, as far as they are in the rectangle r.
+//
+// They are no loop, because lavapipe takes each loop once too often.
+fn look_at_block(
+    planes: ptr<function, PixelPlanes>, block: vec2<u32>, r: vec4<u32>, walk: ptr<function, Walk>,
+) {
+    let at_0 = vec2<u32>(block.x, CHILD_ROWS * block.y);
+    let at_1 = at_0 + vec2<u32>(0u, 1u);
+    let at_2 = at_0 + vec2<u32>(0u, 2u);
+    let at_3 = at_0 + vec2<u32>(0u, 3u);
+    // All reads come first, so that each waits while others do.
+    let depths_0 = read_depths(at_0);
+    let depths_1 = read_depths(at_1);
+    let depths_2 = read_depths(at_2);
+    let depths_3 = read_depths(at_3);
+    look_at_pixels(planes, at_0, depths_0, r, walk);
+    look_at_pixels(planes, at_1, depths_1, r, walk);
+    look_at_pixels(planes, at_2, depths_2, r, walk);
+    look_at_pixels(planes, at_3, depths_3, r, walk);
+}
+
+// Counts a rectangle, together with the other invocations; `budget` is what may be read.
+fn count_together(
+    planes: ptr<function, PixelPlanes>, r: vec4<u32>, budget: u32, lane: u32,
+) -> Walk {
+    var walk = Walk(0u, 0u, 0u, 0u);
+    var left = budget;
+    let base = max(pyramid.first_stored, STEP);
+    // The level to begin with: the finest one with few texels.
+    var top = 0u;
+    var corner = vec2<u32>(r.x >> VECTOR_LOG2, r.y);
+    var width = (r.z >> VECTOR_LOG2) - corner.x + 1u;
+    var rows = width * (r.w - r.y + 1u);
+    for (var level = base; level <= pyramid.last_stored && (top == 0u || rows > CHUNK);
+        level += STEP) {
+        top = level;
+        corner = (r.xy >> vec2<u32>(level)) >> vec2<u32>(VECTOR_LOG2, 0u);
+        let end = (r.zw >> vec2<u32>(level)) >> vec2<u32>(VECTOR_LOG2, 0u);
+        width = end.x - corner.x + 1u;
+        rows = width * (end.y - corner.y + 1u);
+    }
+    if top == 0u {
+        // No level is stored.
+        rows = min(rows, left);
+        for (var t = lane; t < rows; t += TEAM) {
+            let at = corner + place_in(t, width);
+            look_at_pixels(planes, at, read_depths(at), r, &walk);
+        }
+        return walk;
+    }
+
+    // How many texels each list has.
+    var counts_of_lists: array<u32, LISTS>;
+    // The list to enter next; LISTS: the first level is next.
+    var list = LISTS;
+    // How many rows of the first level have been looked at.
+    var next = 0u;
+    // How many texels had been listed before.
+    var before = workgroupUniformLoad(&listed_here);
+    loop {
+        let is_top = list == LISTS;
+        var level = top;
+        var begin = next;
+        var chunk = min(CHUNK, rows - next);
+        if is_top {
+            next += chunk;
+        } else {
+            level = base + STEP * (list - 1u);
+            let entered = min(counts_of_lists[list], CHUNK / CHILD_ROWS);
+            counts_of_lists[list] -= entered;
+            begin = list * LISTED + counts_of_lists[list];
+            chunk = CHILD_ROWS * entered;
+        }
+        chunk = min(chunk, left);
+        left -= chunk;
+        let below = (level - base) / STEP;
+        var t = lane;
+        loop {
+            if t < chunk {
+                var at = corner + place_in(begin + t, width);
+                if !is_top {
+                    let texel = lists[begin + t / CHILD_ROWS];
+                    at = vec2<u32>(
+                        texel & COLUMN_MASK, CHILD_ROWS * (texel >> ROW_SHIFT) + t % CHILD_ROWS);
+                }
+                let bits = look_at_texels(planes, level, at, r, &walk);
+                var place = below * LISTED + atomicAdd(&listed, countOneBits(bits)) - before;
+                for (var k = 0u; k < VECTOR; k += 1u) {
+                    if (bits & (1u << k)) != 0u {
+                        lists[place] = (at.y << ROW_SHIFT) | (VECTOR * at.x + k);
+                        place += 1u;
+                    }
+                }
+            }
+            t += TEAM;
+            continuing {
+                break if t >= chunk;
+            }
+        }
+        workgroupBarrier();
+        if lane == 0u {
+            listed_here = atomicLoad(&listed);
+        }
+        let after = workgroupUniformLoad(&listed_here);
+        counts_of_lists[below] = after - before;
+        before = after;
+
+        // The pixels of what is open at the finest coarse level.
+        let blocks_log2 = base - STEP;
+        let reads = CHILD_ROWS << (2u * blocks_log2);
+        let entered = min(counts_of_lists[0], left / reads);
+        let blocks = entered << (2u * blocks_log2);
+        t = lane;
+        loop {
+            if t < blocks {
+                look_at_block(planes, block_of(t, blocks_log2), r, &walk);
+            }
+            t += TEAM;
+            continuing {
+                break if t >= blocks;
+            }
+        }
+        left = select(left - entered * reads, 0u, entered < counts_of_lists[0]);
+        counts_of_lists[0] = 0u;
+        // The finest level with texels to enter is next, and at last the first level.
+        list = LISTS;
+        for (var k = LISTS - 1u; k > 0u; k -= 1u) {
+            list = select(list, k, counts_of_lists[k] > 0u);
+        }
+        workgroupBarrier();
+        continuing {
+            break if left == 0u || (list == LISTS && next == rows);
+        }
+    }
+    return walk;
+}
+
+@compute @workgroup_size(TEAM)
+fn count_of_many_pixels(
+    @builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    begin();
+    if lane == 0u {
+        large_here = atomicLoad(&large[0]);
+        listed_here = 0u;
+        atomicStore(&listed, 0u);
+    }
+    let count = workgroupUniformLoad(&large_here);
+    if group.x >= count {
+        return;
+    }
+    var k = group.x;
+    loop {
+        let i = atomicLoad(&large[1u + k]);
+        var planes: PixelPlanes;
+        let prepared = prepare(i, &planes);
+        if lane == 0u {
+            rectangle = prepared.rectangle;
+        }
+        let r = workgroupUniformLoad(&rectangle);
+        let walk = count_together(&planes, r, counting.budget, lane);
+        parts[lane] = vec4<u32>(walk.touched, walk.hidden, walk.open, walk.done);
+        workgroupBarrier();
+        if lane == 0u {
+            var sum = parts[0];
+            for (var part = 1u; part < TEAM; part += 1u) {
+                sum += parts[part];
+            }
+            var found = prepared.counts;
+            if prepared.is_open {
+                found = counts_of(Walk(sum.x, sum.y, sum.z, sum.w), r);
+            }
+            write_counts(i, found);
+        }
+        k += groups.x;
+        continuing {
+            break if k >= count;
+        }
+    }
+}
