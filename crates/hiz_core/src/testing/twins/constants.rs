@@ -86,6 +86,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/lod", "LOD_BY_DISTANCE", rule(&LodRule::Distance { thresholds: Vec::new() })),
         ("cull/lod", "LOD_BY_SIZE", rule(&LodRule::Size { pixels: Vec::new() })),
         ("cull/history", "HISTORY_BEGIN", int(HISTORY_BEGIN)),
+        ("cull/history", "SHARES_OF_WORD", int(u32::BITS / GROUPS_OF_RUN)),
+        ("cull/history", "WORDS_OF_GROUP", GROUP as f64 / int(u32::BITS)),
         ("cull/outcome", "AT_VALIDITY", stage(Stage::Validity)),
         ("cull/outcome", "AT_FRUSTUM", stage(Stage::Frustum)),
         ("cull/outcome", "AT_EYE_PLANE", stage(Stage::EyePlane)),
