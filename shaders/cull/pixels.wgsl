@@ -240,7 +240,7 @@ fn count_of_pixels(
     if lane < small_count {
         var planes: PixelPlanes;
         let i = small[lane];
-        // A compiler may fuse what is computed anew in another way, so all of it is taken from here.
+        // A compiler may fuse what is computed anew in another way, so all of it is from here.
         let prepared = prepare(i, &planes);
         var found = prepared.counts;
         if prepared.is_open {
