@@ -7,7 +7,7 @@
 // are absent or not asked for.
 
 // A word per group: VISIBLE if its members are tested, UNOCCLUDED if they are accepted, or less.
-@group(0) @binding(8) var<storage, read> group_verdicts: array<u32>;
+@group(0) @binding(1) var<storage, read> group_verdicts: array<u32>;
 
 @compute @workgroup_size(GROUP)
 fn settle_groups(

@@ -22,7 +22,7 @@ pub(crate) const WORKGROUP: u32 = 64;
 pub(crate) const WORDS_OF_INVOCATION: u32 = 8;
 
 const BEGIN_BINDINGS: &[(u32, Binding)] = &[(0, Binding::Write)];
-const SETTLE_BINDINGS: &[(u32, Binding)] = &[(8, Binding::Read)];
+const SETTLE_BINDINGS: &[(u32, Binding)] = &[(1, Binding::Read)];
 
 /// The shader that chooses how a mask begins.
 pub(crate) fn begin_mask_module() -> Source {
@@ -76,7 +76,7 @@ impl FullMask {
         })?;
         let verdicts = made(&output.settle_bindings, || {
             let verdicts = output.verdicts.as_entire_binding();
-            gpu.bind_group("hiz.settle_groups.verdicts", &settle_layout, &[entry(8, verdicts)])
+            gpu.bind_group("hiz.settle_groups.verdicts", &settle_layout, &[entry(1, verdicts)])
         })?;
         Ok(Self { begin, survivors: survivors.clone(), settle, verdicts: verdicts.clone() })
     }

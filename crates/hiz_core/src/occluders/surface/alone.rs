@@ -11,10 +11,9 @@
 //! [`REACH`]: crate::occluders::surface::facets::REACH
 
 use crate::occluders::surface::coverage::{Grid, for_each_run_inside};
-use crate::occluders::surface::facets::{Corner, Facet};
+use crate::occluders::surface::facets::{Corner, Facet, reach};
 use crate::occluders::surface::looks::{TILE, Tiles};
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
-use crate::occluders::surface::proof::reach;
 use crate::occluders::surface::squares::Squares;
 use crate::occluders::surface::thresholds::Slabs;
 

@@ -35,6 +35,11 @@ const OUTERMOST: f64 = (1 << 21) as f64;
 /// Adding this to a float64 leaves its nearest integer in the low 32 bits (ties to even).
 const TO_INTEGER: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
 
+/// How far squares are grown where edges are tested, in units.
+pub(super) fn reach(fault: Planted) -> i32 {
+    if is_planted!(fault, NoEdgeMargin) { 0 } else { REACH }
+}
+
 /// A point of the rounded image.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Corner {

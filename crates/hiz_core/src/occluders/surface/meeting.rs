@@ -1,10 +1,9 @@
 //! Which facets and edges meet the open pixels of some rows.
 
 use crate::occluders::surface::coverage::Sides;
-use crate::occluders::surface::facets::{Corner, Facet};
+use crate::occluders::surface::facets::{Corner, Facet, reach};
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
-use crate::occluders::surface::proof::reach;
 use crate::occluders::surface::squares::Squares;
 use crate::occluders::surface::walk::{Met, Visitor, Walk};
 

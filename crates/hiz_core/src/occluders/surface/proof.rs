@@ -17,13 +17,15 @@
 //! Exact edges are nearer than [`REACH`] to rounded ones.
 //! So as the vertices move from their rounded to their exact places, no edge that remains crosses
 //! P, and the winding number stays.
+//!
+//! [`REACH`]: crate::occluders::surface::facets::REACH
 
 use crate::host::threads::{cores, on_threads};
 use crate::input::image::ImageSize;
 use crate::occluders::surface::alone::Alone;
 use crate::occluders::surface::chains::{AtEdge, Mask, Steps, Tally};
 use crate::occluders::surface::coverage::area;
-use crate::occluders::surface::facets::{Corner, Facet, REACH};
+use crate::occluders::surface::facets::{Corner, Facet, reach};
 use crate::occluders::surface::looks::{TILE, Tiles};
 use crate::occluders::surface::pixel_bits::PixelBits;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
@@ -115,7 +117,7 @@ struct Band<'a> {
     /// By pixel.
     slabs: &'a [Slabs],
     states: Vec<State>,
-    /// Half the side of a pixel, and [`REACH`], in units.
+    /// Half the side of a pixel, and `REACH`, in units.
     half: f64,
     fault: Planted,
     /// Of the facets at an edge where more than two meet.
@@ -207,11 +209,6 @@ impl Visitor for Band<'_> {
             state.tally.meet_many(at_edge, fault);
         });
     }
-}
-
-/// How far squares are grown where edges are tested, in units.
-pub(super) fn reach(fault: Planted) -> i32 {
-    if is_planted!(fault, NoEdgeMargin) { 0 } else { REACH }
 }
 
 /// The slabs of a square that a facet is in, and how far it reaches there.

@@ -12,11 +12,11 @@
 
 use crate::host::threads::{cores, on_threads};
 use crate::occluders::surface::coverage::QUARTERS;
-use crate::occluders::surface::facets::{Facet, REACH, UNITS};
+use crate::occluders::surface::facets::{Facet, REACH, UNITS, reach};
 use crate::occluders::surface::meeting::{Meeting, NO_PIECE};
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::is_planted;
-use crate::occluders::surface::proof::{band_rows, bands, reach};
+use crate::occluders::surface::proof::{band_rows, bands};
 use crate::occluders::surface::walk::Walk;
 
 /// Quarters are asked where they may bring the distance to the far plane below this share of what

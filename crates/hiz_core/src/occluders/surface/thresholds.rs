@@ -251,8 +251,8 @@ mod tests {
     /// By sorting, and looking for gaps.
     fn sorted(mut nine: [f32; 9], centre: f32) -> (f32, f32) {
         nine.sort_unstable_by(|a, b| b.total_cmp(a));
-        let starts = (0..9).filter(|i| *i == 0 || nine[*i] < STEP * nine[*i - 1]);
-        let start = starts.filter(|i| nine[*i] >= centre).next_back().unwrap();
+        let mut starts = (0..9).filter(|i| *i == 0 || nine[*i] < STEP * nine[*i - 1]);
+        let start = starts.rfind(|i| nine[*i] >= centre).unwrap();
         let end = (start + 1..9).find(|i| nine[*i] < STEP * nine[*i - 1]).unwrap_or(9);
         (if start == 0 { f32::INFINITY } else { nine[start] }, nine[end - 1])
     }
