@@ -31,7 +31,7 @@ fn emit_draws(
         own += Sum(select(0u, filled, w < workgroup.x), filled);
     }
     prefix(lane, own);
-    let all = sums[WORKGROUP - 1u];
+    let all = sum_of_all();
     var at = all.x;
     if lane > 0u {
         at += filled_through(min(id.x - 1u, last));

@@ -5,22 +5,46 @@
 // Twin: `WORKGROUP` in `crates/hiz_core/src/output/emit_passes.rs`.
 const WORKGROUP: u32 = 64u;
 
-var<workgroup> sums: array<Sum, WORKGROUP>;
+// Invocations of a row.
+const ROW: u32 = 8u;
+// Rows of a workgroup.
+const ROWS: u32 = WORKGROUP / ROW;
+
+var<workgroup> own_sums: array<Sum, WORKGROUP>;
+var<workgroup> row_sums: array<Sum, ROWS>;
 
 // The sum of `own` over all invocations up to and including this one.
-// Then `sums[WORKGROUP - 1u]` holds the sum of all.
-// Source: Hillis and Steele, "Data Parallel Algorithms", 1986.
+// Then `sum_of_all` has the sum over the workgroup.
+//
+// Rows are summed first, and earlier rows are added then.
+// So two barriers suffice, where a sum by doubled steps takes two for each doubling.
+// A processor that runs a workgroup pays for each barrier.
+// Source: Blelloch, "Prefix Sums and Their Applications", 1990, section 1.2 (sums of blocks).
 fn prefix(lane: u32, own: Sum) -> Sum {
-    sums[lane] = own;
+    own_sums[lane] = own;
     workgroupBarrier();
-    for (var step = 1u; step < WORKGROUP; step *= 2u) {
-        var earlier = Sum();
-        if lane >= step { earlier = sums[lane - step]; }
-        workgroupBarrier();
-        sums[lane] += earlier;
-        workgroupBarrier();
+    let row = lane / ROW;
+    var through = Sum();
+    for (var l = row * ROW; l <= lane; l += 1u) {
+        through += own_sums[l];
     }
-    return sums[lane];
+    if lane % ROW == ROW - 1u {
+        row_sums[row] = through;
+    }
+    workgroupBarrier();
+    for (var r = 0u; r < row; r += 1u) {
+        through += row_sums[r];
+    }
+    return through;
+}
+
+// The sum over all invocations, after `prefix`.
+fn sum_of_all() -> Sum {
+    var all = Sum();
+    for (var r = 0u; r < ROWS; r += 1u) {
+        all += row_sums[r];
+    }
+    return all;
 }
 
 // Meshes of an invocation of `emit_bins` and of `emit_draws`.

@@ -70,7 +70,7 @@ fn emit_top(@builtin(local_invocation_index) lane: u32) {
             own += blocks[first + b];
         }
         let through = prefix(lane, own);
-        let all = sums[WORKGROUP - 1u];
+        let all = sum_of_all();
         // All bits of earlier planes come first.
         let earlier = Numbers(kept) + sum_before(all);
         var count = earlier + through - own;
@@ -83,8 +83,6 @@ fn emit_top(@builtin(local_invocation_index) lane: u32) {
             blocks[block_at(s, emit.words)] = earlier + all;
         }
         kept += sum(all);
-        // The next set takes the sums anew.
-        workgroupBarrier();
     }
     if lane == 0u {
         let written = min(kept, room());

@@ -7,7 +7,7 @@ use hiz_core::{
 
 use crate::common::Random;
 use crate::engine::first_record;
-use crate::expected::{check, emits};
+use crate::expected::{check, emits, large_crowd};
 use crate::{Crowd, Made, World};
 
 /// Levels of detail per mesh, instances, the share before the wall, the share absent, and how many
@@ -45,6 +45,20 @@ fn bins_hold_what_a_loop_finds() {
                     check(&world, &crowd, lods, &emit, capacity, indexed).unwrap();
                 }
             }
+        }
+    }
+}
+
+/// A piece of more blocks of words than a row of a workgroup adds up.
+#[test]
+fn large_pieces_add_up_all_blocks() {
+    let world = World::new(&[]);
+    let lods = [1, 2, 1];
+    let crowd = large_crowd(&world, &lods);
+    let meshes = world.table(&lods, true);
+    for emit in emits(&meshes) {
+        for capacity in [None, Some(50_000)] {
+            check(&world, &crowd, &lods, &emit, capacity, true).unwrap();
         }
     }
 }

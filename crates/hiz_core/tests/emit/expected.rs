@@ -3,7 +3,11 @@
 use hiz_core::testing::CANARY_WORDS;
 use hiz_core::{CullOptions, Emit, Hierarchy, MeshTable, Outputs, Placement};
 
+use crate::common::Random;
 use crate::{Crowd, World};
+
+/// Instances of a block of 1024 words; `shaders/output/emit_planes.wgsl`.
+const BLOCK_INSTANCES: usize = 32 * 1024;
 
 /// A list of 0xFFFFFFFF into which bins are written, and the bins.
 struct Expected {
@@ -27,6 +31,12 @@ pub(crate) fn record(
     } else {
         vec![total, count, first, first_instance]
     }
+}
+
+/// One piece of ten blocks of words: a row of a workgroup adds up eight.
+pub(crate) fn large_crowd(world: &World, lods: &[usize]) -> Crowd {
+    let made = Crowd::random(9 * BLOCK_INSTANCES + 77, lods, 0.3, 0.1, &mut Random(8));
+    Crowd::new(world, made, None, true)
 }
 
 /// What `crowd` should leave of one piece, with room for `room` more indices.

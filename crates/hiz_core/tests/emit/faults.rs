@@ -1,8 +1,8 @@
 //! Planted faults of the passes of bins are seen.
 
 use crate::common::Random;
-use crate::expected::{check, emits};
-use crate::{Crowd, World};
+use crate::expected::{check, emits, large_crowd};
+use crate::{Crowd, Made, World};
 
 /// Each fault must show: in a list, in the draws or in their number.
 #[test]
@@ -68,6 +68,31 @@ fn planted_faults_are_seen() {
                 .into_iter()
                 .any(|capacity| check(&world, &crowd, &lods, &emit, capacity, true).is_err())
         });
+        assert!(seen, "{name}: nothing shows it");
+    }
+}
+
+/// A prefix sum adds the sums of all rows of its workgroup.
+#[test]
+fn planted_faults_of_the_prefix_sum_are_seen() {
+    for (what, by, name) in [
+        ("through += row_sums[r];", "", "earlier rows"),
+        ("r < row;", "r <= row;", "its own row twice"),
+        ("let row = lane / ROW;", "let row = 0u;", "one row for all"),
+        ("l <= lane;", "l < lane;", "its own number"),
+        ("all += row_sums[r];", "all = row_sums[0];", "all of the first row alone"),
+        ("r < ROWS;", "r < ROWS - 1u;", "all but the last row"),
+    ] {
+        let world = World::new(&[(what, by)]);
+        let is_red = |lods: &[usize], crowd: &Crowd| {
+            let emit = emits(&world.table(lods, true))[0].clone();
+            check(&world, crowd, lods, &emit, None, true).is_err()
+        };
+        // The last row of all has something where draws are of more meshes than 57 workgroups take.
+        let many = vec![1; 30_000];
+        let made = |i: u32| Made { mesh: 29_000 + i, lod: 0, shows: true };
+        let seen = is_red(&[1, 2, 1], &large_crowd(&world, &[1, 2, 1]))
+            || is_red(&many, &Crowd::new(&world, (0..40).map(made).collect(), None, true));
         assert!(seen, "{name}: nothing shows it");
     }
 }

@@ -270,6 +270,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("instances/bounds_point_support", &["CANDIDATES", "OUTLINES"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
+    ("output/emit_prefix", &["ROW", "ROWS"]),
     ("output/emit_record", &["COMMON_WORDS"]),
     ("output/emit_scatter", &["MANY", "LINE", "NO_INDEX_BIT"]),
     ("output/planes_four", &["COUNT_BITS", "COUNT_MASK"]),
