@@ -15,7 +15,7 @@
 // - `outcome.wgsl`, `../output/verdict.wgsl`: `Outcome`, stages, verdicts
 // - `../instances/bounds_*.wgsl`: `load_volume`, `support`, `extent_of`, `surely_after`, `_before`
 // - `../pyramid/texels*.wgsl`, `../pyramid/levels.wgsl`: `texel`, `footprint`, `finest_level`
-// - `unoccluded.wgsl`: `surely_in_front`, `surely_inside`, `descend_in_front`, `rows_in_front`
+// - `unoccluded.wgsl`: `surely_in_front`, `surely_inside`, `descend_in_front`
 // - `unexplained.wgsl` or `explain.wgsl`: `note_texel`, `note_clear`
 
 // The first and last pixel that an extent may touch; if first > last there is none.
@@ -229,11 +229,7 @@ fn classify(i: u32) -> Outcome {
             // No texel is farther than the farthest.
             if !hidden && !in_front && is_inside && level > 0u
                 && surely_in_front(out.farthest_bits, z, w) {
-                if BY_ROWS {
-                    in_front = rows_in_front(level, t, first, last, z, w, &front, &texels_read);
-                } else {
-                    in_front = descend_in_front(level, t, first, last, z, w, &front, &texels_read);
-                }
+                in_front = descend_in_front(level, t, first, last, z, w, &front, &texels_read);
             }
         }
         block = vec4<u32>(first, last);

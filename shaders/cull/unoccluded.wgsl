@@ -28,10 +28,29 @@ fn surely_in_front(bits: u32, z: Value, w: Value) -> bool {
     return surely_below(z, t, w);
 }
 
+// Moves a walk over rows on by a texel, and at a row's end to the row below.
+// False: there is none, so it is over.
+fn next_of_rows(
+    first: vec2<u32>, last: vec2<u32>, level: u32, place: ptr<function, vec2<u32>>,
+) -> bool {
+    var at = *place;
+    at.x += 1u;
+    if at.x > last.x >> level {
+        at = vec2<u32>(first.x >> level, at.y + 1u);
+    }
+    *place = at;
+    return at.y <= last.y >> level;
+}
+
 // True implies: all of the volume is nearer than every pixel of the rectangle first..=last.
 // False: it may not be, or the budget has ended.
 //
 // The walk mirrors `descend`, on the nearest end and with a budget of its own.
+// With BY_ROWS, for the boxes of groups, it goes row by row.
+// What stands on the ground has nearer ground before it, at the lower border of its rectangle.
+// There all texels of a row fail alike, so the walk enters the whole row with the first that fails.
+// So it accepts more of such groups with as many texels.
+//
 // `front` becomes the nearest depth of the texels that decided, or the one that did not.
 fn descend_in_front(
     top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, z: Value, w: Value,
@@ -50,7 +69,13 @@ fn descend_in_front(
         let bits = nearest_texel(level, at.x, at.y);
         if surely_in_front(bits, z, w) {
             decided = nearest(decided, bits);
-            if !next_texel(top, t, first, last, &level, &at) {
+            var goes_on = false;
+            if BY_ROWS {
+                goes_on = next_of_rows(first, last, level, &at);
+            } else {
+                goes_on = next_texel(top, t, first, last, &level, &at);
+            }
+            if !goes_on {
                 *front = decided;
                 return true;
             }
@@ -65,53 +90,9 @@ fn descend_in_front(
         }
         let down = levels_down(level);
         level -= down;
-        at = max(at << vec2<u32>(down), first >> vec2<u32>(level));
-    }
-    return false;
-}
-
-// The same as `descend_in_front`, row by row, for the boxes of groups.
-//
-// What stands on the ground has nearer ground before it, at the lower border of its rectangle.
-// There all texels of a row fail alike, so the walk enters the whole row at the first that fails.
-// So it accepts more of such groups than `descend_in_front` does with as many texels.
-fn rows_in_front(
-    top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, z: Value, w: Value,
-    front: ptr<function, u32>, texels_read: ptr<function, u32>,
-) -> bool {
-    var left = view.descent_budget;
-    var level = top;
-    var at = t.xy;
-    var decided = far_bits();
-    loop {
-        if left == 0u {
-            return false;
-        }
-        left -= 1u;
-        *texels_read += 1u;
-        let bits = nearest_texel(level, at.x, at.y);
-        if surely_in_front(bits, z, w) {
-            decided = nearest(decided, bits);
-            at.x += 1u;
-            if at.x > last.x >> level {
-                at = vec2<u32>(first.x >> level, at.y + 1u);
-                if at.y > last.y >> level {
-                    *front = decided;
-                    return true;
-                }
-            }
-            continue;
-        }
-        // As in `descend_in_front`.
-        let begin = at << vec2<u32>(level);
-        let end = min((at + vec2<u32>(1u)) << vec2<u32>(level), vec2<u32>(view.size));
-        if level == 0u || (all(begin >= first) && all(end <= last + vec2<u32>(1u))) {
-            *front = bits;
-            return false;
-        }
-        let down = levels_down(level);
-        level -= down;
-        at = vec2<u32>(first.x >> level, max(at.y << down, first.y >> level));
+        // With BY_ROWS the texels before it in its row have passed, so the walk goes on below it.
+        let least = first >> vec2<u32>(level);
+        at = max(at << vec2<u32>(down), least);
     }
     return false;
 }

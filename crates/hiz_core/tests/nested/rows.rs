@@ -1,4 +1,4 @@
-//! Groups that are accepted by a walk over rows of texels (`rows_in_front` in
+//! Groups that are accepted by a walk over rows of texels (`descend_in_front` in
 //! `shaders/cull/unoccluded.wgsl`).
 //! Expectations come from the pixels, by loops of these tests.
 
@@ -76,15 +76,20 @@ fn faults_of_rows_are_seen() {
     for (what, by) in [
         // The last column or row is left out.
         ("if at.x > last.x >> level {\n", "if at.x >= last.x >> level {\n"),
-        ("if at.y > last.y >> level {\n", "if at.y >= last.y >> level {\n"),
+        ("return at.y <= last.y >> level;", "return at.y < (last.y >> level);"),
         // The first ones are left out.
         ("vec2<u32>(first.x >> level, at.y + 1u)", "vec2<u32>((first.x >> level) + 1u, at.y + 1u)"),
-        ("max(at.y << down, first.y >> level));", "(at.y + 1u) << down);"),
-        // A row that fails counts as passed.
         (
-            "level -= down;\n        at = vec2<u32>",
-            "level -= 0u;\n        at = vec2<u32>(0u, 1u) + vec2<u32>",
+            "at = max(at << vec2<u32>(down), least);",
+            "at = max((at << vec2<u32>(down)) + vec2<u32>(0u, 1u), least);",
         ),
+        // Of the row below, the texels left of the one that failed are left out.
+        (
+            "    if at.x > last.x >> level {\n        at = vec2<u32>(first.x >> level, at.y + 1u);",
+            "    if at.x > last.x >> level {\n        at = vec2<u32>((*place).x, at.y + 1u);",
+        ),
+        // A texel that fails counts as passed.
+        ("at = max(at << vec2<u32>(down), least);", "at = (at << vec2<u32>(down)) + 1u;"),
     ] {
         let [accepted, wrong] = check(&faulty(&[(what, by)]));
         eprintln!("{what} -> {by}: {wrong} of {accepted}");
