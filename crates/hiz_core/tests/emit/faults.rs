@@ -78,7 +78,7 @@ fn planted_faults_of_the_prefix_sum_are_seen() {
     for (what, by, name) in [
         ("through += row_sums[r];", "", "earlier rows"),
         ("r < row;", "r <= row;", "its own row twice"),
-        ("let row = lane / ROW;", "let row = 0u;", "one row for all"),
+        ("var l = row * ROW;", "var l = row * ROW + 1u;", "the first of each row"),
         ("l <= lane;", "l < lane;", "its own number"),
         ("all += row_sums[r];", "all = row_sums[0];", "all of the first row alone"),
         ("r < ROWS;", "r < ROWS - 1u;", "all but the last row"),
