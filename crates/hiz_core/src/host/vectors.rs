@@ -25,8 +25,11 @@
 //! whether the greater of 0 and -0 is negative.
 //! Each user compares the bits of both ways in a test.
 
+use bytemuck::Pod;
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-use fearless_simd::{Level, Simd};
+use fearless_simd::prelude::*;
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+use fearless_simd::{Avx2, Level, mask32x8};
 
 /// Runs `work` with the widest vectors that this processor has.
 ///
@@ -46,6 +49,104 @@ pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
     }
     work()
 }
+
+/// What loops over eight lanes do not tell compilers well enough: comparisons that become bits, and
+/// choices by bits.
+pub(crate) trait Eight: Copy {
+    /// A bit for each lane where `a` is greater than `b`.
+    fn greater(self, a: &[f32; 8], b: &[f32; 8]) -> u32;
+
+    /// A bit for each lane where `a` is at least `b`.
+    fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32;
+
+    /// A bit for each lane that is negative.
+    fn negative(self, a: &[i32; 8]) -> u32;
+
+    /// Puts `new` into the lanes of `old` that have a bit.
+    fn put<T: Pod>(self, bits: u32, new: &[T; 8], old: &mut [T; 8]);
+}
+
+/// [`Eight`] as loops, for every processor.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plain;
+
+impl Eight for Plain {
+    #[inline(always)]
+    fn greater(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
+        (0..8).fold(0, |bits, l| bits | u32::from(a[l] > b[l]) << l)
+    }
+
+    #[inline(always)]
+    fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
+        (0..8).fold(0, |bits, l| bits | u32::from(a[l] >= b[l]) << l)
+    }
+
+    #[inline(always)]
+    fn negative(self, a: &[i32; 8]) -> u32 {
+        (0..8).fold(0, |bits, l| bits | (a[l] as u32 >> 31) << l)
+    }
+
+    #[inline(always)]
+    fn put<T: Pod>(self, bits: u32, new: &[T; 8], old: &mut [T; 8]) {
+        for l in 0..8 {
+            old[l] = if bits >> l & 1 == 1 { new[l] } else { old[l] };
+        }
+    }
+}
+
+/// [`Eight`] as one vector.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+impl Eight for Avx2 {
+    #[inline(always)]
+    fn greater(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
+        let [a, b] = [a, b].map(|v| self.load_array_ref_f32x8(v));
+        a.simd_gt(b).to_bitmask() as u32
+    }
+
+    #[inline(always)]
+    fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
+        let [a, b] = [a, b].map(|v| self.load_array_ref_f32x8(v));
+        a.simd_ge(b).to_bitmask() as u32
+    }
+
+    #[inline(always)]
+    fn negative(self, a: &[i32; 8]) -> u32 {
+        let zero = self.splat_i32x8(0);
+        self.load_array_ref_i32x8(a).simd_lt(zero).to_bitmask() as u32
+    }
+
+    #[inline(always)]
+    fn put<T: Pod>(self, bits: u32, new: &[T; 8], old: &mut [T; 8]) {
+        let (new, old): (&[u32; 8], &mut [u32; 8]) =
+            (bytemuck::cast_ref(new), bytemuck::cast_mut(old));
+        let chosen = mask32x8::from_bitmask(self, u64::from(bits));
+        let [new, before] = [new, &*old].map(|v| self.load_array_ref_u32x8(v));
+        *old = *chosen.select(new, before);
+    }
+}
+
+/// Runs work that is compiled for the widest vectors, which it gets as an [`Eight`].
+macro_rules! with_eight {
+    ($eight:ident => $work:expr) => {{
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        if let Some($eight) = fearless_simd::Level::new().as_avx2() {
+            fearless_simd::Simd::vectorize(
+                $eight,
+                #[inline(always)]
+                || $work,
+            )
+        } else {
+            let $eight = $crate::host::vectors::Plain;
+            $work
+        }
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        {
+            let $eight = $crate::host::vectors::Plain;
+            $work
+        }
+    }};
+}
+pub(crate) use with_eight;
 
 /// `all` without an early end, which would keep a compiler from making vectors.
 #[inline(always)]
