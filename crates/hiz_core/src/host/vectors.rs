@@ -16,6 +16,12 @@
 //! Only what is inlined into the closure.
 //! So `#[inline(always)]` stands in front of the closure, and of each function that it calls.
 //!
+//! # Eight lanes
+//!
+//! A comparison of eight numbers is one instruction, and eight bits of it are another.
+//! No loop tells a compiler this reliably, nor which of two rows' numbers to take by such bits.
+//! [`Eight`] has these operations, as loops and as vectors of that crate; [`with_eight`] chooses.
+//!
 //! # Results
 //!
 //! They have the same bits on every processor.
@@ -217,6 +223,41 @@ mod tests {
             || operations(&numbers, wide, true),
         );
         assert!(differences(plain, wide) > 100);
+    }
+
+    /// What [`Eight`] finds of two rows, and what it makes of the second.
+    fn found(eight: impl Eight, a: &[f32; 8], b: &[f32; 8]) -> ([u32; 3], [u32; 8]) {
+        let (greater, at_least) = (eight.greater(a, b), eight.at_least(a, b));
+        let negative = eight.negative(&bytemuck::cast(*a));
+        let mut chosen = *b;
+        eight.put(greater ^ at_least << 1, a, &mut chosen);
+        ([greater, at_least, negative], chosen.map(f32::to_bits))
+    }
+
+    #[test]
+    fn eight_lanes_say_the_same_plain_and_as_vectors() {
+        let numbers: Vec<f32> = numbers().iter().map(|v| *v as f32).collect();
+        let (rows, _) = numbers.as_chunks::<8>();
+        let special = [0.0, -0.0, f32::NAN, f32::INFINITY, -1.0, 1.0, -f32::INFINITY, 1e-40];
+        let mut bits = [0; 3];
+        for pair in rows.windows(2).map(|pair| [pair[0], pair[1]]).chain([[special; 2]]) {
+            for shift in 0..8 {
+                let (mut a, b) = (pair[0], pair[1]);
+                a.rotate_left(shift);
+                let plain = found(Plain, &a, &b);
+                for l in 0..8 {
+                    let expected = [a[l] > b[l], a[l] >= b[l], a[l].is_sign_negative()];
+                    for (count, (bits, is_so)) in
+                        bits.iter_mut().zip(plain.0.into_iter().zip(expected))
+                    {
+                        assert_eq!(bits >> l & 1 == 1, is_so, "{a:?} {b:?} {l}");
+                        *count += u32::from(is_so);
+                    }
+                }
+                assert_eq!(with_eight!(eight => found(eight, &a, &b)), plain, "{a:?} {b:?}");
+            }
+        }
+        assert!(bits.iter().all(|count| *count > 0), "{bits:?}");
     }
 
     #[test]

@@ -334,7 +334,7 @@ impl Band {
         self.rises.push(Rise { slope: t.slope, nearest: t.nearest });
         with_eight!(eight => if end - begin < NARROW {
             for row in first..=last {
-                self.draw_narrow(eight, t, edges, &steps, row, (begin, end), is_large);
+                self.draw_narrow(eight, t, edges, &steps, row, rows, (begin, end), is_large);
             }
         } else {
             self.draw_wide(eight, t, edges, &steps, (begin, end), (first, last));
@@ -413,11 +413,14 @@ impl Band {
         edges: &Edges,
         steps: &Steps,
         row: i32,
+        rows: (i32, i32),
         (begin, end): (i32, i32),
         is_large: bool,
     ) {
         let mut at = edges.at(t, begin * STEP, row * STEP);
         let below = t.slope[1] * to_pixels(row * STEP * UNITS + HALF - t.y[0]);
+        let rows = ((rows.0 - row * STEP).max(0), (rows.1 - row * STEP).min(STEP - 1));
+        let rows = rows.0 as usize..rows.1 as usize + 1;
         let own_row = (row - self.top / STEP) as usize;
         for column in begin..=end {
             let here = at;
@@ -439,7 +442,17 @@ impl Band {
             let here = three(|k| here[k].clamp(-LARGE, LARGE) as i32);
             let plane = Plane { nearness, slope: t.slope, nearest: t.nearest };
             let place = (column as usize, own_row);
-            self.draw_tile(eight, place, edges, here, plane, (low, high), is_full, is_large);
+            self.draw_tile(
+                eight,
+                place,
+                edges,
+                here,
+                plane,
+                (low, high),
+                is_full,
+                is_large,
+                rows.clone(),
+            );
             let cell = own_row / LANES * (self.across / LANES);
             self.is_cell_stale[cell + column as usize / LANES] = true;
         }
@@ -471,7 +484,17 @@ impl Band {
                 let at = at[k] + l as i64 * i64::from(STEP * edges.right[k]);
                 at.clamp(-LARGE, LARGE) as i32
             });
-            self.draw_tile(eight, (place.0 + l, place.1), edges, at, plane, range, is_full, true);
+            self.draw_tile(
+                eight,
+                (place.0 + l, place.1),
+                edges,
+                at,
+                plane,
+                range,
+                is_full,
+                true,
+                0..SIDE,
+            );
         }
     }
 
@@ -491,13 +514,15 @@ impl Band {
         (low, high): (f32, f32),
         is_full: bool,
         is_large: bool,
+        rows: Range<usize>,
     ) {
         let index = place.1 * self.across + place.0;
         let l = index % LANES;
         let before = &self.tiles[index / LANES];
         let mut is_front = low >= before.nearest[l];
         if !is_front && before.states[l] >= FULL {
-            match order(&plane, high, &self.full_plane(index), before.nearest[l]) {
+            let other = self.full_plane(index);
+            match order((&plane, high), (&other, before.nearest[l]), self.image.fault) {
                 Some(false) => return,
                 Some(true) => is_front = true,
                 None => {}
@@ -528,10 +553,11 @@ impl Band {
         self.is_stale[index] = false;
         let mut pixels = self.pixels_of(place);
         let farthest = if is_full {
-            pixels.draw(&plane, |_| [u32::MAX; SIDE])
+            pixels.draw(&plane, 0..SIDE, |_| [u32::MAX; SIDE])
         } else {
-            let mut at_row = edges.columns(at);
-            pixels.draw(&plane, |_| {
+            let skipped = rows.start as i32;
+            let mut at_row = edges.columns(three(|k| at[k] + skipped * edges.down[k]));
+            pixels.draw(&plane, rows, |_| {
                 let inside = inside(&at_row);
                 edges.step_down(&mut at_row);
                 inside

@@ -10,9 +10,11 @@
 //! Every way gives the same numbers: a pixel holds the greatest nearness of the planes that cover
 //! its centre.
 
+use std::ops::Range;
+
 use crate::host::vectors::{Eight, with_eight};
 use crate::occluders::host_raster::edges::Segment;
-use crate::occluders::host_raster::lanes::lanes;
+use crate::occluders::host_raster::lanes::{lanes, least_of};
 use crate::occluders::host_raster::lens::{greatest, least};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::meshlets::LANES;
@@ -78,20 +80,21 @@ fn nearer(plane: &Plane, other: &Plane) -> Mask {
 }
 
 /// Whether the first of two planes is nearer than the second over all of a tile, or nowhere;
-/// `None` where this is left to [`nearer`].
+/// `None` where each pixel has to be asked.
 ///
 /// `high` and `other_high` are their greatest values over the tile.
-///
-/// Without their caps, the computed values lie within four roundings of those of the real planes,
-/// whose difference is least and greatest at two corners.
-/// A cap changes no order where the plane in front stays in front with it.
+/// docs/occluders.md has the proof that this is what [`nearer`] finds.
 #[inline(always)]
-pub(super) fn order(plane: &Plane, high: f32, other: &Plane, other_high: f32) -> Option<bool> {
-    /// Twice what a value's roundings and those of the difference amount to, as a share of the
-    /// terms' sizes.
-    const MARGIN: f32 = 16.0 * f32::EPSILON;
+pub(super) fn order(
+    (plane, high): (&Plane, f32),
+    (other, other_high): (&Plane, f32),
+    fault: Planted,
+) -> Option<bool> {
+    /// Twice what the roundings amount to at most, as a share of the terms' sizes.
+    const MARGIN: f32 = 8.0 * f32::EPSILON;
     const LAST: f32 = (SIDE - 1) as f32;
-    let (mut low, mut top) = (plane.nearness - other.nearness, plane.nearness - other.nearness);
+    let first = plane.nearness - other.nearness;
+    let (mut low, mut top) = (first, first);
     let mut size = plane.nearness.abs() + other.nearness.abs();
     for k in 0..2 {
         let rise = (plane.slope[k] - other.slope[k]) * LAST;
@@ -100,6 +103,9 @@ pub(super) fn order(plane: &Plane, high: f32, other: &Plane, other_high: f32) ->
         size += (plane.slope[k].abs() + other.slope[k].abs()) * LAST;
     }
     let margin = size * MARGIN + f32::MIN_POSITIVE;
+    if is_planted!(fault, OrderOfOnePixel) {
+        return Some(first > 0.0);
+    }
     if low > margin && plane.nearest > other_high {
         Some(true)
     } else if top < -margin && other.nearest >= high {
@@ -230,7 +236,7 @@ impl Tile<'_> {
                 continue;
             }
             let hidden = if high > layer.least {
-                match order(&plane, high, &layer.plane, layer.greatest) {
+                match order((&plane, high), (&layer.plane, layer.greatest), self.fault) {
                     Some(true) => 0,
                     Some(false) => layer.mask,
                     None => layer.mask & !nearer(&plane, &layer.plane),
@@ -291,15 +297,21 @@ impl Pixels<'_> {
         }
     }
 
-    /// Draws a plane into those that `covered` names row by row; returns the farthest of all.
+    /// Draws a plane into those that `covered` names, row by row of `rows`; returns the farthest of
+    /// all.
     #[inline(always)]
     pub(super) fn draw(
         &mut self,
         plane: &Plane,
+        rows: Range<usize>,
         mut covered: impl FnMut(usize) -> [u32; SIDE],
     ) -> f32 {
         let mut farthest = [f32::MAX; SIDE];
-        for row in 0..SIDE {
+        for row in (0..rows.start).chain(rows.end..SIDE) {
+            let pixels = self.row(row);
+            farthest = lanes(|l| least(pixels[l], farthest[l]));
+        }
+        for row in rows {
             let (covered, nearness) = (covered(row), plane.row(row));
             let pixels = self.row(row);
             for l in 0..SIDE {
@@ -323,14 +335,6 @@ impl Pixels<'_> {
         }
         least_of(&farthest)
     }
-}
-
-/// The least of a row.
-#[inline(always)]
-fn least_of(v: &[f32; SIDE]) -> f32 {
-    let pair = |i: usize| least(v[i], v[i + 4]);
-    let half = [pair(0), pair(1), pair(2), pair(3)];
-    least(least(half[0], half[2]), least(half[1], half[3]))
 }
 
 /// Whether layers cover all of a tile.
