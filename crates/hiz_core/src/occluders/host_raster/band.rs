@@ -10,15 +10,15 @@ use crate::input::image::DepthConvention;
 use crate::occluders::host_raster::edges::{
     Edges, LARGE, STEP, Segment, Spans, Steps, bits, inside, to_pixels,
 };
-use crate::occluders::host_raster::lanes::{lanes, three};
-use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS, greatest, least};
+use crate::occluders::host_raster::lanes::{greatest, lanes, least, three};
+use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS};
 use crate::occluders::host_raster::planted_fault::is_planted;
 #[cfg(feature = "methods")]
 use crate::occluders::host_raster::tile::is_covered;
 use crate::occluders::host_raster::tile::{
-    CLEAR, FULL, Layers, Mask, PIXELS, Pixels, Plane, Rise, SIDE, State, Tile, Tiles, order,
-    row_of_layers,
+    CLEAR, FULL, Layers, Mask, PIXELS, Pixels, Plane, Rise, SIDE, State, Tile, order, row_of_layers,
 };
+use crate::occluders::host_raster::tiles::Tiles;
 use crate::occluders::host_raster::triangle::Triangle;
 use crate::occluders::meshlets::LANES;
 
@@ -405,6 +405,7 @@ impl Band {
     }
 
     /// Draws a triangle into the tiles `begin..=end` of a row, one by one.
+    #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
     #[inline(always)]
     fn draw_narrow(
         &mut self,

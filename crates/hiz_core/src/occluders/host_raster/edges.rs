@@ -1,8 +1,8 @@
 //! What a triangle does from pixel to pixel and from tile to tile: its edges and its depth.
 
 use crate::host::vectors::Eight;
-use crate::occluders::host_raster::lanes::{lanes, three};
-use crate::occluders::host_raster::lens::{HALF, UNITS, least};
+use crate::occluders::host_raster::lanes::{lanes, least, three};
+use crate::occluders::host_raster::lens::{HALF, UNITS};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::{Mask, SIDE};
 use crate::occluders::host_raster::triangle::Triangle;

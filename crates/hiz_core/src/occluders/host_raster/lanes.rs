@@ -3,7 +3,6 @@
 //! `array::map` and `array::from_fn` do the same, but compilers do not always inline them.
 //! Then each element costs a call, which made whole images up to a fifth slower.
 
-use crate::occluders::host_raster::lens::least;
 use crate::occluders::meshlets::LANES;
 
 /// One value for each corner or edge of a triangle.
@@ -28,4 +27,16 @@ pub(super) fn least_of(v: &[f32; LANES]) -> f32 {
     let pair = |i: usize| least(v[i], v[i + 4]);
     let half = [pair(0), pair(1), pair(2), pair(3)];
     least(least(half[0], half[2]), least(half[1], half[3]))
+}
+
+/// `a` where it is less, else `b`: one instruction for vectors, unlike `f32::min`.
+#[inline(always)]
+pub(super) fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// `a` where it is greater, else `b`.
+#[inline(always)]
+pub(super) fn greatest(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }

@@ -9,7 +9,7 @@ use crate::host::rounding::flushed;
 use crate::host::vectors::Eight;
 use crate::input::camera::Camera;
 use crate::input::image::{ImageSize, MAX_IMAGE_SIDE};
-use crate::occluders::host_raster::lanes::{lanes, least_of, three};
+use crate::occluders::host_raster::lanes::{greatest, lanes, least, least_of, three};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::meshlets::LANES;
 use crate::occluders::view::PlacedView;
@@ -39,18 +39,6 @@ const MAGIC: f32 = 12_582_912.0; // 1.5 * 2^23
 #[inline(always)]
 pub(super) fn rounded(v: f32) -> i32 {
     (v + MAGIC).to_bits().wrapping_sub(MAGIC.to_bits()) as i32
-}
-
-/// `a` where it is less, else `b`: one instruction for vectors, unlike `f32::min`.
-#[inline(always)]
-pub(super) fn least(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// `a` where it is greater, else `b`.
-#[inline(always)]
-pub(super) fn greatest(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 /// The image, in units about its middle.

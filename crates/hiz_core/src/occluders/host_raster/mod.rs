@@ -12,6 +12,7 @@
 //! 4. `triangle`: exact edges on a grid of 1/256 pixel, and the plane of the depth.
 //!    `edges` follows them from pixel to pixel and from tile to tile.
 //! 5. `tile`: 8x8 pixels as planes with coverage masks, or as pixels.
+//!    `tiles` compares eight of them with a triangle at once.
 //!
 //! **What it promises.**
 //! A pixel holds the nearest depth of the triangles that cover its centre.
@@ -43,6 +44,7 @@ pub(crate) mod planted_fault;
 #[cfg(feature = "methods")]
 pub(crate) mod snapped;
 mod tile;
+mod tiles;
 mod triangle;
 mod vertices;
 

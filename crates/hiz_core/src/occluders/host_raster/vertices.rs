@@ -6,8 +6,8 @@
 use std::ops::Range;
 
 use crate::input::mesh::FaceCull;
-use crate::occluders::host_raster::lanes::{lanes, three};
-use crate::occluders::host_raster::lens::{HALF, Image, LEAST_W, Lens, greatest, least, rounded};
+use crate::occluders::host_raster::lanes::{greatest, lanes, least, three};
+use crate::occluders::host_raster::lens::{HALF, Image, LEAST_W, Lens, rounded};
 use crate::occluders::host_raster::planted_fault::is_planted;
 use crate::occluders::host_raster::triangle::Corner;
 use crate::occluders::meshlets::{Blocks, LANES, MAX_TRIANGLES, MAX_VERTICES, Meshlet};
