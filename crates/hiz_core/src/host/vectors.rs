@@ -94,8 +94,8 @@ impl Eight for Plain {
 
     #[inline(always)]
     fn put<T: Pod>(self, bits: u32, new: &[T; 8], old: &mut [T; 8]) {
-        for l in 0..8 {
-            old[l] = if bits >> l & 1 == 1 { new[l] } else { old[l] };
+        for (l, (old, new)) in old.iter_mut().zip(new).enumerate() {
+            *old = if bits >> l & 1 == 1 { *new } else { *old };
         }
     }
 }
@@ -230,7 +230,7 @@ mod tests {
         let (greater, at_least) = (eight.greater(a, b), eight.at_least(a, b));
         let negative = eight.negative(&bytemuck::cast(*a));
         let mut chosen = *b;
-        eight.put(greater ^ at_least << 1, a, &mut chosen);
+        eight.put(greater ^ (at_least << 1), a, &mut chosen);
         ([greater, at_least, negative], chosen.map(f32::to_bits))
     }
 
@@ -245,12 +245,11 @@ mod tests {
                 let (mut a, b) = (pair[0], pair[1]);
                 a.rotate_left(shift);
                 let plain = found(Plain, &a, &b);
-                for l in 0..8 {
-                    let expected = [a[l] > b[l], a[l] >= b[l], a[l].is_sign_negative()];
-                    for (count, (bits, is_so)) in
-                        bits.iter_mut().zip(plain.0.into_iter().zip(expected))
+                for (l, (a, b)) in a.iter().zip(&b).enumerate() {
+                    let expected = [a > b, a >= b, a.is_sign_negative()];
+                    for (count, (bits, is_so)) in bits.iter_mut().zip(plain.0.iter().zip(expected))
                     {
-                        assert_eq!(bits >> l & 1 == 1, is_so, "{a:?} {b:?} {l}");
+                        assert_eq!(bits >> l & 1 == 1, is_so, "{a} {b}");
                         *count += u32::from(is_so);
                     }
                 }
