@@ -125,13 +125,13 @@ pub(super) struct Layer {
 /// The layers of a tile, of which its state counts those in use.
 pub(super) type Layers = [Layer; MOST_LAYERS];
 
-/// How the depth of a tile is kept: as so many layers, as [`PIXELS`], or as a plane from [`FULL`] on.
+/// How the depth of a tile is kept: as so many layers, as [`PIXELS`], or as one plane ([`FULL`]).
 pub(super) type State = u32;
 /// Nothing was drawn.
 pub(super) const CLEAR: State = 0;
 /// The tile has pixels.
 pub(super) const PIXELS: State = MOST_LAYERS as State + 1;
-/// One plane in front of everything else covers the tile.
+/// From here on, one plane in front of everything else covers the tile.
 /// What is added is the number of its [`Rise`] in the band.
 pub(super) const FULL: State = PIXELS + 1;
 
