@@ -600,6 +600,7 @@ fn planted_faults_are_seen() {
         RasterFault::GuardClamped,
         RasterFault::ClippedInFloat32,
         RasterFault::MasksShifted,
+        RasterFault::OrderOfOnePixel,
         RasterFault::LayersOverlap,
         RasterFault::MirrorsIgnored,
     ];

@@ -16,6 +16,12 @@
 //! Only what is inlined into the closure.
 //! So `#[inline(always)]` stands in front of the closure, and of each function that it calls.
 //!
+//! # Eight lanes
+//!
+//! A comparison of eight numbers is one instruction, and eight bits of it are another.
+//! No loop tells a compiler this reliably, nor which of two rows' numbers to take by such bits.
+//! [`Eight`] has these operations, as loops and as vectors of that crate; [`with_eight`] chooses.
+//!
 //! # Results
 //!
 //! They have the same bits on every processor.
@@ -25,8 +31,11 @@
 //! whether the greater of 0 and -0 is negative.
 //! Each user compares the bits of both ways in a test.
 
+use bytemuck::Pod;
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-use fearless_simd::{Level, Simd};
+use fearless_simd::prelude::*;
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+use fearless_simd::{Avx2, Level, mask32x8};
 
 /// Runs `work` with the widest vectors that this processor has.
 ///
@@ -46,6 +55,104 @@ pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
     }
     work()
 }
+
+/// What loops over eight lanes do not tell compilers well enough: comparisons that become bits, and
+/// choices by bits.
+pub(crate) trait Eight: Copy {
+    /// A bit for each lane where `a` is greater than `b`.
+    fn greater(self, a: &[f32; 8], b: &[f32; 8]) -> u32;
+
+    /// A bit for each lane where `a` is at least `b`.
+    fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32;
+
+    /// A bit for each lane that is negative.
+    fn negative(self, a: &[i32; 8]) -> u32;
+
+    /// Puts `new` into the lanes of `old` that have a bit.
+    fn put<T: Pod>(self, bits: u32, new: &[T; 8], old: &mut [T; 8]);
+}
+
+/// [`Eight`] as loops, for every processor.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plain;
+
+impl Eight for Plain {
+    #[inline(always)]
+    fn greater(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
+        (0..8).fold(0, |bits, l| bits | u32::from(a[l] > b[l]) << l)
+    }
+
+    #[inline(always)]
+    fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
+        (0..8).fold(0, |bits, l| bits | u32::from(a[l] >= b[l]) << l)
+    }
+
+    #[inline(always)]
+    fn negative(self, a: &[i32; 8]) -> u32 {
+        (0..8).fold(0, |bits, l| bits | (a[l] as u32 >> 31) << l)
+    }
+
+    #[inline(always)]
+    fn put<T: Pod>(self, bits: u32, new: &[T; 8], old: &mut [T; 8]) {
+        for (l, (old, new)) in old.iter_mut().zip(new).enumerate() {
+            *old = if bits >> l & 1 == 1 { *new } else { *old };
+        }
+    }
+}
+
+/// [`Eight`] as one vector.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+impl Eight for Avx2 {
+    #[inline(always)]
+    fn greater(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
+        let [a, b] = [a, b].map(|v| self.load_array_ref_f32x8(v));
+        a.simd_gt(b).to_bitmask() as u32
+    }
+
+    #[inline(always)]
+    fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
+        let [a, b] = [a, b].map(|v| self.load_array_ref_f32x8(v));
+        a.simd_ge(b).to_bitmask() as u32
+    }
+
+    #[inline(always)]
+    fn negative(self, a: &[i32; 8]) -> u32 {
+        let zero = self.splat_i32x8(0);
+        self.load_array_ref_i32x8(a).simd_lt(zero).to_bitmask() as u32
+    }
+
+    #[inline(always)]
+    fn put<T: Pod>(self, bits: u32, new: &[T; 8], old: &mut [T; 8]) {
+        let (new, old): (&[u32; 8], &mut [u32; 8]) =
+            (bytemuck::cast_ref(new), bytemuck::cast_mut(old));
+        let chosen = mask32x8::from_bitmask(self, u64::from(bits));
+        let [new, before] = [new, &*old].map(|v| self.load_array_ref_u32x8(v));
+        *old = *chosen.select(new, before);
+    }
+}
+
+/// Runs work that is compiled for the widest vectors, which it gets as an [`Eight`].
+macro_rules! with_eight {
+    ($eight:ident => $work:expr) => {{
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        if let Some($eight) = fearless_simd::Level::new().as_avx2() {
+            fearless_simd::Simd::vectorize(
+                $eight,
+                #[inline(always)]
+                || $work,
+            )
+        } else {
+            let $eight = $crate::host::vectors::Plain;
+            $work
+        }
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        {
+            let $eight = $crate::host::vectors::Plain;
+            $work
+        }
+    }};
+}
+pub(crate) use with_eight;
 
 /// `all` without an early end, which would keep a compiler from making vectors.
 #[inline(always)]
@@ -116,6 +223,40 @@ mod tests {
             || operations(&numbers, wide, true),
         );
         assert!(differences(plain, wide) > 100);
+    }
+
+    /// What [`Eight`] finds of two rows, and what it makes of the second.
+    fn found(eight: impl Eight, a: &[f32; 8], b: &[f32; 8]) -> ([u32; 3], [u32; 8]) {
+        let (greater, at_least) = (eight.greater(a, b), eight.at_least(a, b));
+        let negative = eight.negative(&bytemuck::cast(*a));
+        let mut chosen = *b;
+        eight.put(greater ^ (at_least << 1), a, &mut chosen);
+        ([greater, at_least, negative], chosen.map(f32::to_bits))
+    }
+
+    #[test]
+    fn eight_lanes_say_the_same_plain_and_as_vectors() {
+        let numbers: Vec<f32> = numbers().iter().map(|v| *v as f32).collect();
+        let (rows, _) = numbers.as_chunks::<8>();
+        let special = [0.0, -0.0, f32::NAN, f32::INFINITY, -1.0, 1.0, -f32::INFINITY, 1e-40];
+        let mut bits = [0; 3];
+        for pair in rows.windows(2).map(|pair| [pair[0], pair[1]]).chain([[special; 2]]) {
+            for shift in 0..8 {
+                let (mut a, b) = (pair[0], pair[1]);
+                a.rotate_left(shift);
+                let plain = found(Plain, &a, &b);
+                for (l, (a, b)) in a.iter().zip(&b).enumerate() {
+                    let expected = [a > b, a >= b, a.is_sign_negative()];
+                    for (count, (bits, is_so)) in bits.iter_mut().zip(plain.0.iter().zip(expected))
+                    {
+                        assert_eq!(bits >> l & 1 == 1, is_so, "{a} {b}");
+                        *count += u32::from(is_so);
+                    }
+                }
+                assert_eq!(with_eight!(eight => found(eight, &a, &b)), plain, "{a:?} {b:?}");
+            }
+        }
+        assert!(bits.iter().all(|count| *count > 0), "{bits:?}");
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub(super) struct Cover {
 /// The bit of column `x` and row `y` of a word, which are below 8.
 #[inline]
 pub(super) fn bit(x: i32, y: i32) -> u64 {
-    1 << (8 * x + 7 - y)
+    1 << (8 * y + x)
 }
 
 impl Cover {

@@ -5,19 +5,20 @@
 
 use std::ops::{Range, RangeInclusive};
 
-use crate::host::vectors::widest;
+use crate::host::vectors::{Eight, widest, with_eight};
 use crate::input::image::DepthConvention;
 use crate::occluders::host_raster::edges::{
     Edges, LARGE, STEP, Segment, Spans, Steps, bits, inside, to_pixels,
 };
-use crate::occluders::host_raster::lanes::{lanes, three};
-use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS, greatest, least};
+use crate::occluders::host_raster::lanes::{greatest, lanes, least, three};
+use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS};
 use crate::occluders::host_raster::planted_fault::is_planted;
 #[cfg(feature = "methods")]
 use crate::occluders::host_raster::tile::is_covered;
 use crate::occluders::host_raster::tile::{
-    CLEAR, FULL, Layers, Mask, PIXELS, Pixels, Plane, Rise, SIDE, State, Tile, row_of_layers,
+    CLEAR, FULL, Layers, Mask, PIXELS, Pixels, Plane, Rise, SIDE, State, Tile, order, row_of_layers,
 };
+use crate::occluders::host_raster::tiles::Tiles;
 use crate::occluders::host_raster::triangle::Triangle;
 use crate::occluders::meshlets::LANES;
 
@@ -35,10 +36,8 @@ pub(super) struct Band {
     across: usize,
     /// Pixels in a row, some past the image's edge.
     stride: usize,
-    /// By tile: see [`Tile`].
-    farthest: Vec<f32>,
-    nearest: Vec<f32>,
-    states: Vec<State>,
+    /// In rows of the image, [`LANES`] at once.
+    tiles: Vec<Tiles>,
     /// By tile: pixels were written since `farthest` was computed.
     is_stale: Vec<bool>,
     /// The tiles that are stale, and some that no longer are.
@@ -47,9 +46,7 @@ pub(super) struct Band {
     cells: Vec<f32>,
     /// By cell: a tile's `farthest` has changed since that of the cell was computed.
     is_cell_stale: Vec<bool>,
-    /// By tile that is [`FULL`]: nearness at its first pixel, and where its triangle is in `rises`.
-    first: Vec<f32>,
-    risen: Vec<u32>,
+    /// By triangle that was drawn by tiles.
     rises: Vec<Rise>,
     /// By tile: where its layers are in `layers`; 0 until it needs them.
     slots: Vec<u32>,
@@ -72,15 +69,11 @@ impl Band {
             bottom,
             across,
             stride,
-            farthest: vec![0.0; count],
-            nearest: vec![0.0; count],
-            states: vec![CLEAR; count],
+            tiles: vec![Tiles::default(); count / LANES],
             is_stale: vec![false; count],
             stale: Vec::new(),
             cells: vec![0.0; cells],
             is_cell_stale: vec![false; cells],
-            first: vec![0.0; count],
-            risen: vec![0; count],
             rises: Vec::new(),
             slots: vec![0; count],
             layers: vec![Layers::default()],
@@ -91,12 +84,10 @@ impl Band {
     /// Bytes of its arrays.
     #[cfg(feature = "methods")]
     pub(super) fn bytes(&self) -> u64 {
-        let floats = [&self.farthest, &self.nearest, &self.cells, &self.first, &self.pixels];
-        let floats: usize = floats.iter().map(|list| size_of_val(&list[..])).sum();
-        let tiles = size_of_val(&self.states[..])
+        let floats = size_of_val(&self.cells[..]) + size_of_val(&self.pixels[..]);
+        let tiles = size_of_val(&self.tiles[..])
             + size_of_val(&self.is_stale[..])
             + size_of_val(&self.is_cell_stale[..])
-            + size_of_val(&self.risen[..])
             + size_of_val(&self.slots[..]);
         let lists = size_of_val(&self.stale[..])
             + size_of_val(&self.rises[..])
@@ -105,9 +96,7 @@ impl Band {
     }
 
     pub(super) fn clear(&mut self) {
-        self.farthest.fill(0.0);
-        self.nearest.fill(0.0);
-        self.states.fill(CLEAR);
+        self.tiles.fill(Tiles::default());
         self.is_stale.fill(false);
         self.stale.clear();
         self.cells.fill(0.0);
@@ -134,7 +123,7 @@ impl Band {
                 let columns = within(&columns, cell);
                 for row in within(&rows, cell_row) {
                     for column in columns.clone() {
-                        if self.farthest[row * self.across + column] < extent.nearest
+                        if self.farthest(row * self.across + column) < extent.nearest
                             && !self.pixels_hide(column, row, extent)
                         {
                             return false;
@@ -149,7 +138,7 @@ impl Band {
     /// Whether the pixels of a tile hide the part of `extent` that lies in it.
     #[inline(never)]
     fn pixels_hide(&self, column: usize, row: usize, extent: &Extent) -> bool {
-        if self.states[row * self.across + column] == CLEAR {
+        if self.state(row * self.across + column) == CLEAR {
             return false;
         }
         let within = |(first, last): (i32, i32), begin: i32| {
@@ -175,9 +164,9 @@ impl Band {
 
     #[inline(never)]
     fn renew_cell(&mut self, cell: usize, row: usize, column: usize) {
-        let rows = self.farthest.chunks_exact(self.across).skip(row * LANES).take(LANES);
+        let rows = self.tiles.chunks_exact(self.across / LANES).skip(row * LANES).take(LANES);
         let farthest = rows.fold([f32::MAX; LANES], |farthest, row| {
-            let row: &[f32; LANES] = &row.as_chunks().0[column];
+            let row = &row[column].farthest;
             lanes(|l| least(row[l], farthest[l]))
         });
         let all = if is_planted!(self.image.fault, CellOfOneTile) { 1 } else { LANES };
@@ -198,11 +187,27 @@ impl Band {
     }
 
     #[inline(always)]
+    fn farthest(&self, index: usize) -> f32 {
+        self.tiles[index / LANES].farthest[index % LANES]
+    }
+
+    #[inline(always)]
+    fn state(&self, index: usize) -> State {
+        self.tiles[index / LANES].states[index % LANES]
+    }
+
+    #[inline(always)]
+    fn set_state(&mut self, index: usize, state: State) {
+        self.tiles[index / LANES].states[index % LANES] = state;
+    }
+
+    #[inline(always)]
     fn tile(&mut self, index: usize) -> Tile<'_> {
+        let (tiles, l) = (&mut self.tiles[index / LANES], index % LANES);
         Tile {
-            farthest: &mut self.farthest[index],
-            nearest: &mut self.nearest[index],
-            state: &mut self.states[index],
+            farthest: &mut tiles.farthest[l],
+            nearest: &mut tiles.nearest[l],
+            state: &mut tiles.states[l],
             layers: &mut self.layers[self.slots[index] as usize],
             fault: self.image.fault,
         }
@@ -224,7 +229,8 @@ impl Band {
     /// The plane of a tile that is [`FULL`].
     #[inline(always)]
     fn full_plane(&self, index: usize) -> Plane {
-        Plane::at(self.first[index], &self.rises[self.risen[index] as usize])
+        let (tiles, l) = (&self.tiles[index / LANES], index % LANES);
+        Plane::at(tiles.first[l], &self.rises[(tiles.states[l] - FULL) as usize])
     }
 
     /// Gives a tile room for layers, and makes the plane of one that is [`FULL`] a layer.
@@ -234,7 +240,7 @@ impl Band {
             self.slots[index] = self.layers.len() as u32;
             self.layers.push(Layers::default());
         }
-        if self.states[index] == FULL {
+        if self.state(index) >= FULL {
             let plane = self.full_plane(index);
             self.tile(index).settle(plane);
         }
@@ -246,7 +252,7 @@ impl Band {
         let index = row * self.across + column;
         let rows: [_; SIDE] = std::array::from_fn(|y| self.row_of_tile(column, row, y));
         self.pixels_of((column, row)).fill(|y| rows[y]);
-        self.states[index] = PIXELS;
+        self.set_state(index, PIXELS);
     }
 
     /// Draws the part of a triangle that lies in this band.
@@ -277,12 +283,13 @@ impl Band {
         for row in tile_row(rows.0)..=tile_row(rows.1) {
             for column in begin..=end {
                 let tile = row * self.across + column;
-                self.nearest[tile] = greatest(self.nearest[tile], t.nearest);
+                let nearest = &mut self.tiles[tile / LANES].nearest[tile % LANES];
+                *nearest = greatest(*nearest, t.nearest);
                 if !self.is_stale[tile] {
                     self.is_stale[tile] = true;
                     self.stale.push(tile as u32);
                 }
-                if self.states[tile] != PIXELS {
+                if self.state(tile) != PIXELS {
                     self.expand((column, row));
                 }
             }
@@ -316,7 +323,6 @@ impl Band {
         columns: (i32, i32),
         rows: (i32, i32),
     ) {
-        const MANY: i32 = LANES as i32;
         let (begin, end) = (columns.0 / STEP, columns.1 / STEP);
         let (first, last) = (rows.0 / STEP, rows.1 / STEP);
         let tiles = (end - begin + 1) * (last - first + 1);
@@ -326,16 +332,35 @@ impl Band {
         }
         let steps = Steps::new(t, edges, self.image.fault);
         self.rises.push(Rise { slope: t.slope, nearest: t.nearest });
-        if end - begin < NARROW {
+        with_eight!(eight => if end - begin < NARROW {
             for row in first..=last {
-                self.draw_narrow(t, edges, &steps, row, (begin, end), is_large);
+                self.draw_narrow(eight, t, edges, &steps, row, rows, (begin, end), is_large);
             }
-            return;
-        }
-        let at = edges.at(t, begin * STEP, first * STEP);
-        let mut spans = Spans::new(&at, edges, &steps, (begin, end), self.image.fault);
+        } else {
+            self.draw_wide(eight, t, edges, &steps, (begin, end), (first, last));
+        });
+    }
+
+    /// Draws a triangle into the tiles `begin..=end` of the rows `first..=last`, [`LANES`] at once.
+    #[inline(always)]
+    fn draw_wide(
+        &mut self,
+        eight: impl Eight,
+        t: &Triangle,
+        edges: &Edges,
+        steps: &Steps,
+        (begin, end): (i32, i32),
+        (first, last): (i32, i32),
+    ) {
+        const MANY: i32 = LANES as i32;
+        let mut at = edges.at(t, begin * STEP, first * STEP);
+        let mut spans = Spans::new(&at, edges, steps, (begin, end), self.image.fault);
         for row in first..=last {
             let [met, covered] = spans.row();
+            let at_row = at;
+            for k in 0..3 {
+                at[k] += i64::from(STEP * edges.down[k]);
+            }
             spans.step_down();
             if met.0 >= met.1 {
                 continue;
@@ -345,18 +370,21 @@ impl Band {
             for group in met.0 / MANY..=(met.1 - 1) / MANY {
                 let column = group * MANY;
                 let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
-                let (cell_row, cell) = (own_row / LANES, group as usize);
-                if steps.nearest_of_segment(t, x, y) <= self.cell(cell_row, cell) {
-                    continue;
-                }
-                let segment = Segment::new(t, &steps, (x, y));
-                let tiles = own_row * self.across + column as usize;
+                let segment = Segment::new(t, steps, (x, y));
+                let tiles = own_row * (self.across / LANES) + group as usize;
+                let state = FULL + self.rises.len() as State - 1;
                 let (met, covered) = (bits(met, column), bits(covered, column));
-                let open = self.replace(&segment, tiles, met, covered);
-                if let Some(open) = open {
-                    self.draw_segment(t, edges, &segment, (column, row), (open, covered));
-                    self.is_cell_stale[cell_row * (self.across / LANES) + cell] = true;
-                }
+                let Some(open) = self.tiles[tiles].replace(eight, &segment, met, covered, state)
+                else {
+                    continue;
+                };
+                let cell = own_row / LANES * (self.across / LANES) + group as usize;
+                self.is_cell_stale[cell] = true;
+                let place = (column as usize, own_row);
+                let at = three(|k| {
+                    at_row[k] + i64::from(column - begin) * i64::from(STEP * edges.right[k])
+                });
+                self.draw_segment(eight, t, edges, &segment, place, at, (open, covered));
             }
         }
     }
@@ -377,18 +405,23 @@ impl Band {
     }
 
     /// Draws a triangle into the tiles `begin..=end` of a row, one by one.
+    #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
     #[inline(always)]
     fn draw_narrow(
         &mut self,
+        eight: impl Eight,
         t: &Triangle,
         edges: &Edges,
         steps: &Steps,
         row: i32,
+        rows: (i32, i32),
         (begin, end): (i32, i32),
         is_large: bool,
     ) {
         let mut at = edges.at(t, begin * STEP, row * STEP);
         let below = t.slope[1] * to_pixels(row * STEP * UNITS + HALF - t.y[0]);
+        let rows = ((rows.0 - row * STEP).max(0), (rows.1 - row * STEP).min(STEP - 1));
+        let rows = rows.0 as usize..rows.1 as usize + 1;
         let own_row = (row - self.top / STEP) as usize;
         for column in begin..=end {
             let here = at;
@@ -402,7 +435,7 @@ impl Band {
             let nearness = (t.nearness + t.slope[0] * x) + below;
             let index = own_row * self.across + column as usize;
             let high = least(steps.high[0] + (nearness + steps.high[1]), t.nearest);
-            if high <= self.farthest[index] {
+            if high <= self.farthest(index) {
                 continue;
             }
             let low = least(steps.low[0] + (nearness + steps.low[1]), t.nearest);
@@ -410,58 +443,36 @@ impl Band {
             let here = three(|k| here[k].clamp(-LARGE, LARGE) as i32);
             let plane = Plane { nearness, slope: t.slope, nearest: t.nearest };
             let place = (column as usize, own_row);
-            self.draw_tile(place, edges, here, plane, (low, high), is_full, is_large);
+            self.draw_tile(
+                eight,
+                place,
+                edges,
+                here,
+                plane,
+                (low, high),
+                is_full,
+                is_large,
+                rows.clone(),
+            );
             let cell = own_row / LANES * (self.across / LANES);
             self.is_cell_stale[cell + column as usize / LANES] = true;
         }
     }
 
-    /// Draws a triangle where it covers whole tiles of a segment in front of everything.
+    /// Draws a triangle into the tiles of a segment that are `open`.
     ///
-    /// `met` and `covered` have a bit for each tile.
-    /// What comes back are the tiles where it may show and is not drawn yet; `None` if it shows
-    /// nowhere.
-    #[inline(always)]
-    fn replace(&mut self, segment: &Segment, first: usize, met: u32, covered: u32) -> Option<u32> {
-        fn part<T>(of: &mut [T], first: usize) -> &mut [T; LANES] {
-            &mut of.as_chunks_mut().0[first / LANES]
-        }
-        let nearest = part(&mut self.nearest, first);
-        let farthest = part(&mut self.farthest, first);
-        let (mut open, mut front) = (0, 0);
-        for l in 0..LANES {
-            open |= if segment.high[l] > farthest[l] { 1 << l } else { 0 };
-            front |= if segment.low[l] >= nearest[l] { 1 << l } else { 0 };
-        }
-        open &= met;
-        front &= open & covered;
-        if front == 0 {
-            return (open != 0).then_some(open);
-        }
-        let triangle = self.rises.len() as u32 - 1;
-        let states = part(&mut self.states, first);
-        let (at, risen) = (part(&mut self.first, first), part(&mut self.risen, first));
-        for l in 0..LANES {
-            let is_front = front & (1 << l) != 0;
-            nearest[l] = if is_front { segment.high[l] } else { nearest[l] };
-            farthest[l] = if is_front { segment.low[l] } else { farthest[l] };
-            at[l] = if is_front { segment.nearness[l] } else { at[l] };
-            risen[l] = if is_front { triangle } else { risen[l] };
-            states[l] = if is_front { FULL } else { states[l] };
-        }
-        Some(open & !front)
-    }
-
-    /// Draws a triangle into the tiles of a segment that are `open`, of which it covers some.
-    ///
-    /// `column` and `row` are those of the segment's first tile in the image.
+    /// `place` and `at` are those of the segment's first tile, see [`Self::draw_tile`]; `covered`
+    /// are those that the triangle covers.
+    #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
     #[inline(always)]
     fn draw_segment(
         &mut self,
+        eight: impl Eight,
         t: &Triangle,
         edges: &Edges,
         segment: &Segment,
-        (column, row): (i32, i32),
+        place: (usize, usize),
+        at: [i64; 3],
         (mut open, covered): (u32, u32),
     ) {
         while open != 0 {
@@ -470,10 +481,21 @@ impl Band {
             let plane = Plane { nearness: segment.nearness[l], slope: t.slope, nearest: t.nearest };
             let range = (segment.low[l], segment.high[l]);
             let is_full = covered >> l & 1 == 1;
-            let at = edges.at(t, (column + l as i32) * STEP, row * STEP);
-            let at = three(|k| at[k].clamp(-LARGE, LARGE) as i32);
-            let place = (column as usize + l, (row - self.top / STEP) as usize);
-            self.draw_tile(place, edges, at, plane, range, is_full, true);
+            let at = three(|k| {
+                let at = at[k] + l as i64 * i64::from(STEP * edges.right[k]);
+                at.clamp(-LARGE, LARGE) as i32
+            });
+            self.draw_tile(
+                eight,
+                (place.0 + l, place.1),
+                edges,
+                at,
+                plane,
+                range,
+                is_full,
+                true,
+                0..SIDE,
+            );
         }
     }
 
@@ -485,6 +507,7 @@ impl Band {
     #[inline(always)]
     fn draw_tile(
         &mut self,
+        eight: impl Eight,
         place: (usize, usize),
         edges: &Edges,
         at: [i32; 3],
@@ -492,19 +515,29 @@ impl Band {
         (low, high): (f32, f32),
         is_full: bool,
         is_large: bool,
+        rows: Range<usize>,
     ) {
         let index = place.1 * self.across + place.0;
-        if is_full && low >= self.nearest[index] {
-            (self.farthest[index], self.nearest[index]) = (low, high);
-            (self.first[index], self.states[index]) = (plane.nearness, FULL);
-            self.risen[index] = self.rises.len() as u32 - 1;
+        let l = index % LANES;
+        let before = &self.tiles[index / LANES];
+        let mut is_front = low >= before.nearest[l];
+        if !is_front && before.states[l] >= FULL {
+            let other = self.full_plane(index);
+            match order((&plane, high), (&other, before.nearest[l]), self.image.fault) {
+                Some(false) => return,
+                Some(true) => is_front = true,
+                None => {}
+            }
+        }
+        if is_full && is_front {
+            let state = FULL + self.rises.len() as State - 1;
+            self.tiles[index / LANES].put(l, &plane, (low, high), state);
             return;
         }
-        if self.states[index] != PIXELS && (is_large || is_full) {
-            let mask = if is_full { Mask::MAX } else { edges.mask(at) };
-            let shifted = u32::from(is_planted!(self.image.fault, MasksShifted));
-            // A column's rows run from its byte's highest bit.
-            let mask = mask >> shifted & (Mask::MAX / 255 * (255 >> shifted));
+        if self.state(index) != PIXELS && (is_large || is_full) {
+            let mask = if is_full { Mask::MAX } else { edges.mask(eight, at) };
+            let shifted = if is_planted!(self.image.fault, MasksShifted) { SIDE } else { 0 };
+            let mask = mask << shifted;
             if mask == 0 {
                 return;
             }
@@ -513,22 +546,25 @@ impl Band {
                 return;
             }
         }
-        if self.states[index] != PIXELS {
+        if self.state(index) != PIXELS {
             self.expand(place);
         }
-        self.nearest[index] = greatest(self.nearest[index], high);
+        let nearest = &mut self.tiles[index / LANES].nearest[l];
+        *nearest = greatest(*nearest, high);
         self.is_stale[index] = false;
         let mut pixels = self.pixels_of(place);
-        self.farthest[index] = if is_full {
-            pixels.draw(&plane, |_| [u32::MAX; SIDE])
+        let farthest = if is_full {
+            pixels.draw(&plane, 0..SIDE, |_| [u32::MAX; SIDE])
         } else {
-            let mut at_row = edges.columns(at);
-            pixels.draw(&plane, |_| {
+            let skipped = rows.start as i32;
+            let mut at_row = edges.columns(three(|k| at[k] + skipped * edges.down[k]));
+            pixels.draw(&plane, rows, |_| {
                 let inside = inside(&at_row);
                 edges.step_down(&mut at_row);
                 inside
             })
         };
+        self.tiles[index / LANES].farthest[l] = farthest;
     }
 
     /// Computes the farthest depths again of the tiles whose pixels were written.
@@ -536,14 +572,14 @@ impl Band {
         let mut stale = std::mem::take(&mut self.stale);
         for index in stale.drain(..).map(|index| index as usize) {
             let is_stale = std::mem::take(&mut self.is_stale[index]);
-            if is_stale && self.states[index] == PIXELS {
+            if is_stale && self.state(index) == PIXELS {
                 let (row, column) = (index / self.across, index % self.across);
                 let cell = row / LANES * (self.across / LANES) + column / LANES;
                 self.is_cell_stale[cell] = true;
-                self.farthest[index] = self.pixels_of((column, row)).farthest();
-                if is_planted!(self.image.fault, RenewedTooNear) {
-                    self.farthest[index] = self.nearest[index];
-                }
+                let farthest = self.pixels_of((column, row)).farthest();
+                let (tiles, l) = (&mut self.tiles[index / LANES], index % LANES);
+                let is_wrong = is_planted!(self.image.fault, RenewedTooNear);
+                tiles.farthest[l] = if is_wrong { tiles.nearest[l] } else { farthest };
             }
         }
         self.stale = stale;
@@ -554,8 +590,8 @@ impl Band {
     #[cfg(feature = "methods")]
     pub(super) fn exact_farthest(&self, column: usize, row: usize) -> Option<f32> {
         let tile = row * self.across + column;
-        match self.states[tile] {
-            CLEAR | FULL | PIXELS => Some(self.farthest[tile]),
+        match self.state(tile) {
+            CLEAR | PIXELS | FULL.. => Some(self.farthest(tile)),
             state => (!is_covered(state, self.layers_of(tile))).then_some(0.0),
         }
     }
@@ -564,12 +600,12 @@ impl Band {
     #[inline(always)]
     pub(super) fn row_of_tile(&self, column: usize, row: usize, y: usize) -> [f32; SIDE] {
         let tile = row * self.across + column;
-        match self.states[tile] {
+        match self.state(tile) {
             PIXELS => {
                 let first = (row * SIDE + y) * self.stride + column * SIDE;
                 self.pixels[first..].as_chunks().0[0]
             }
-            FULL => self.full_plane(tile).row(y),
+            FULL.. => self.full_plane(tile).row(y),
             state => row_of_layers(state, self.layers_of(tile), y, self.image.fault),
         }
     }
@@ -615,13 +651,13 @@ impl Band {
             for column in 0..width.div_ceil(SIDE) {
                 let (tile, left) = (row as usize * self.across + column, column * SIDE);
                 let block = (&mut lines[..], wide, column);
-                match self.states[tile] {
+                match self.state(tile) {
                     PIXELS => {
                         let first = row as usize * SIDE * self.stride + left;
                         let pixels = |y| self.pixels[first + y * self.stride..].as_chunks().0[0];
                         fill(block, depth_of, pixels);
                     }
-                    FULL => {
+                    FULL.. => {
                         let plane = self.full_plane(tile);
                         fill(block, depth_of, |y| plane.row(y));
                     }

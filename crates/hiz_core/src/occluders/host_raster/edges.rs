@@ -1,7 +1,8 @@
 //! What a triangle does from pixel to pixel and from tile to tile: its edges and its depth.
 
-use crate::occluders::host_raster::lanes::{lanes, three};
-use crate::occluders::host_raster::lens::{HALF, UNITS, least};
+use crate::host::vectors::Eight;
+use crate::occluders::host_raster::lanes::{lanes, least, three};
+use crate::occluders::host_raster::lens::{HALF, UNITS};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::{Mask, SIDE};
 use crate::occluders::host_raster::triangle::Triangle;
@@ -61,26 +62,21 @@ impl Edges {
     }
 
     /// Which pixels of a tile are inside, given the functions at its first pixel.
-    #[inline(never)]
-    pub(super) fn mask(&self, at: [i32; 3]) -> Mask {
-        let columns = self.columns(at);
-        // By column, a bit for each row.
-        // Each row has a bit of its own, since of shifts compilers make no vectors here.
-        let mut outside = [0_i32; LANES];
+    #[inline(always)]
+    pub(super) fn mask(&self, eight: impl Eight, at: [i32; 3]) -> Mask {
+        let mut outside = 0;
         for k in 0..3 {
             // Most edges do not cross the tile.
             if at[k] + (STEP - 1) * (self.right[k].min(0) + self.down[k].min(0)) >= 0 {
                 continue;
             }
-            let mut edge = columns[k];
+            let mut edge = lanes(|l| at[k] + self.right[k] * l as i32);
             for row in 0..SIDE {
-                for l in 0..LANES {
-                    outside[l] |= (edge[l] >> 31) & (1 << (SIDE - 1 - row));
-                    edge[l] += self.down[k];
-                }
+                outside |= Mask::from(eight.negative(&edge)) << (SIDE * row);
+                edge = lanes(|l| edge[l] + self.down[k]);
             }
         }
-        !Mask::from_le_bytes(lanes(|l| outside[l] as u8))
+        !outside
     }
 
     #[inline(always)]
@@ -125,15 +121,6 @@ impl Steps {
             low: std::array::from_fn(|k| corner(k, t.slope[k] < 0.0) * middle),
             high: std::array::from_fn(|k| corner(k, t.slope[k] >= 0.0)),
         }
-    }
-
-    /// The greatest nearness over [`LANES`] tiles; `x` and `y` as for [`Segment::new`].
-    #[inline(always)]
-    pub(super) fn nearest_of_segment(&self, t: &Triangle, x: f32, y: f32) -> f32 {
-        // Rounded sums are monotone, so one of the two ends has the greatest value of all.
-        let beyond = if t.slope[0] > 0.0 { ((LANES - 1) * SIDE) as f32 } else { 0.0 };
-        let nearness = (t.nearness + t.slope[0] * (x + beyond)) + t.slope[1] * y;
-        least(self.high[0] + (nearness + self.high[1]), t.nearest)
     }
 }
 

@@ -6,10 +6,12 @@
 
 use crate::host::linear::{Mat4, Vec3, dot, sub};
 use crate::host::rounding::flushed;
+use crate::host::vectors::Eight;
 use crate::input::camera::Camera;
 use crate::input::image::{ImageSize, MAX_IMAGE_SIDE};
+use crate::occluders::host_raster::lanes::{greatest, lanes, least, least_of, three};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
-use crate::occluders::placement::box_corner;
+use crate::occluders::meshlets::LANES;
 use crate::occluders::view::PlacedView;
 
 /// Units per pixel.
@@ -37,18 +39,6 @@ const MAGIC: f32 = 12_582_912.0; // 1.5 * 2^23
 #[inline(always)]
 pub(super) fn rounded(v: f32) -> i32 {
     (v + MAGIC).to_bits().wrapping_sub(MAGIC.to_bits()) as i32
-}
-
-/// `a` where it is less, else `b`: one instruction for vectors, unlike `f32::min`.
-#[inline(always)]
-pub(super) fn least(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// `a` where it is greater, else `b`.
-#[inline(always)]
-pub(super) fn greatest(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 /// The image, in units about its middle.
@@ -188,56 +178,72 @@ impl Extent {
 /// A box counts as hidden if its nearest point is behind what has been drawn.
 /// A wrong answer would lose an occluder, not hide an instance.
 /// Its margins still cover the roundings, so that skipping hidden boxes changes no pixel.
-pub(super) fn extent(lens: &Lens, image: &Image, min: Vec3, max: Vec3) -> Option<Extent> {
-    extent_within(lens, image, min, max, |row, reach| {
-        row[0].abs() * reach[0] + row[1].abs() * reach[1] + row[2].abs() * reach[2]
-    })
+#[inline(always)]
+pub(super) fn extent(
+    eight: impl Eight,
+    lens: &Lens,
+    image: &Image,
+    min: Vec3,
+    max: Vec3,
+) -> Option<Extent> {
+    extent_within(
+        eight,
+        lens,
+        image,
+        min,
+        max,
+        #[inline(always)]
+        |row, reach| row[0].abs() * reach[0] + row[1].abs() * reach[1] + row[2].abs() * reach[2],
+    )
 }
 
 /// [`extent`], where `terms` bounds the sizes of a row's first three terms anywhere in a box of
 /// this reach from the eye, however its vertices are computed.
 #[inline(always)]
 pub(super) fn extent_within(
+    eight: impl Eight,
     lens: &Lens,
     image: &Image,
     min: Vec3,
     max: Vec3,
     terms: impl Fn(&[f32; 4], &[f32; 3]) -> f32,
 ) -> Option<Extent> {
+    const ALL: u32 = (1 << LANES) - 1;
     #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
-    let at: [[f32; 8]; 3] = {
-        let corners: [Vec3; 8] = std::array::from_fn(|i| sub(box_corner(min, max, i), lens.eye));
-        std::array::from_fn(|k| corners.map(|c| c[k] as f32))
+    let ends = three(|k| [(min[k] - lens.eye[k]) as f32, (max[k] - lens.eye[k]) as f32]);
+    let at = three(|k| lanes(|i| ends[k][i >> k & 1]));
+    let row = |k: usize| {
+        let r = &lens.rows[k];
+        lanes(|i| r[0] * at[0][i] + r[1] * at[1][i] + (r[2] * at[2][i] + r[3]))
     };
-    let clip: [[f32; 8]; 4] = lens.rows.map(|r| {
-        std::array::from_fn(|i| r[0] * at[0][i] + r[1] * at[1][i] + (r[2] * at[2][i] + r[3]))
-    });
     // What the roundings of a row amount to at most, anywhere in the box.
-    let reach = at.map(|v| v[0].abs().max(v[7].abs()));
-    let [ex, ey, en, ew] = lens.rows.map(|r| (terms(&r, &reach) + r[3].abs()) * ROW_MARGIN);
-    let [x, y, n, w] = clip;
-    let half = image.half.map(|h| h as f32 + 2.0 * UNITS as f32);
-    // How many corners are outside of each plane, and how many need clipping.
-    let mut outside = [0_u32; 6];
-    let mut crossing = 0;
-    for i in 0..8 {
-        let far = half.map(|half| half * (w[i] + ew));
-        outside[0] += u32::from(x[i] + ex < -far[0]);
-        outside[1] += u32::from(x[i] - ex > far[0]);
-        outside[2] += u32::from(y[i] + ey < -far[1]);
-        outside[3] += u32::from(y[i] - ey > far[1]);
-        outside[4] += u32::from(n[i] - en > w[i] + ew);
-        outside[5] += u32::from(n[i] + en < 0.0);
-        // NaN counts as crossing.
-        let is_behind = (n[i] + en <= w[i] - ew)
-            & (w[i] - ew > LEAST_W)
-            & (x[i].abs() + y[i].abs() < f32::INFINITY);
-        crossing += u32::from(!is_behind);
-    }
-    if outside.contains(&8) {
+    let reach = three(|k| ends[k][0].abs().max(ends[k][1].abs()));
+    let spare = |k: usize| {
+        let r = &lens.rows[k];
+        (terms(r, &reach) + r[3].abs()) * ROW_MARGIN
+    };
+    let [x, y, n, w] = [row(0), row(1), row(2), row(3)];
+    let [ex, ey, en, ew] = [spare(0), spare(1), spare(2), spare(3)];
+    let half = [0, 1].map(|k: usize| image.half[k] as f32 + 2.0 * UNITS as f32);
+    // Which corners are outside of each plane, and which surely need no clipping.
+    let most = lanes(|i| w[i] + ew);
+    let far = |k: usize, sign: f32| lanes(|i| sign * (half[k] * most[i]));
+    let plus = |v: &[f32; LANES], e: f32| lanes(|i| v[i] + e);
+    let is_outside = eight.greater(&far(0, -1.0), &plus(&x, ex)) == ALL
+        || eight.greater(&plus(&x, -ex), &far(0, 1.0)) == ALL
+        || eight.greater(&far(1, -1.0), &plus(&y, ey)) == ALL
+        || eight.greater(&plus(&y, -ey), &far(1, 1.0)) == ALL
+        || eight.greater(&plus(&n, -en), &most) == ALL
+        || eight.greater(&[0.0; LANES], &plus(&n, en)) == ALL;
+    if is_outside {
         return None;
     }
-    if crossing > 0 {
+    let smallest = plus(&w, -ew);
+    // NaN counts as crossing.
+    let behind = eight.at_least(&smallest, &plus(&n, en))
+        & eight.greater(&smallest, &[LEAST_W; LANES])
+        & eight.greater(&[f32::INFINITY; LANES], &lanes(|i| x[i].abs() + y[i].abs()));
+    if behind != ALL {
         let all = |side: i32| (0, side - 1);
         return Some(Extent {
             nearest: f32::MAX,
@@ -245,19 +251,17 @@ pub(super) fn extent_within(
             rows: all(image.height),
         });
     }
-    let (mut left, mut right, mut top, mut bottom) = (f32::MAX, f32::MIN, f32::MAX, f32::MIN);
-    let (mut nearest, mut farthest) = (0.0, 1.0);
-    for i in 0..8 {
-        let inverse = [1.0 / (w[i] + ew), 1.0 / (w[i] - ew)];
-        let low = |v: f32| least(v * inverse[0], v * inverse[1]);
-        let high = |v: f32| greatest(v * inverse[0], v * inverse[1]);
-        left = least(left, low(x[i] - ex));
-        right = greatest(right, high(x[i] + ex));
-        top = least(top, low(y[i] - ey));
-        bottom = greatest(bottom, high(y[i] + ey));
-        nearest = greatest(nearest, high(n[i] + en));
-        farthest = least(farthest, n[i] * inverse[0]);
-    }
+    let inverse = [lanes(|i| 1.0 / most[i]), lanes(|i| 1.0 / smallest[i])];
+    let low = |v: &[f32; LANES], e: f32| {
+        least_of(&lanes(|i| least((v[i] - e) * inverse[0][i], (v[i] - e) * inverse[1][i])))
+    };
+    let high = |v: &[f32; LANES], e: f32| {
+        let v = lanes(|i| -greatest((v[i] + e) * inverse[0][i], (v[i] + e) * inverse[1][i]));
+        -least_of(&v)
+    };
+    let (left, right, top, bottom) = (low(&x, ex), high(&x, ex), low(&y, ey), high(&y, ey));
+    let nearest = greatest(0.0, high(&n, en));
+    let farthest = least(1.0, least_of(&lanes(|i| n[i] * inverse[0][i])));
     // A pixel to spare on each side covers the roundings that follow.
     let spare = UNITS as f32;
     let nearest = if is_planted!(image.fault, BoxesByTheirFarthest) { farthest } else { nearest };

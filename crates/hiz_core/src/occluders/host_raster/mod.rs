@@ -12,6 +12,7 @@
 //! 4. `triangle`: exact edges on a grid of 1/256 pixel, and the plane of the depth.
 //!    `edges` follows them from pixel to pixel and from tile to tile.
 //! 5. `tile`: 8x8 pixels as planes with coverage masks, or as pixels.
+//!    `tiles` compares eight of them with a triangle at once.
 //!
 //! **What it promises.**
 //! A pixel holds the nearest depth of the triangles that cover its centre.
@@ -43,6 +44,7 @@ pub(crate) mod planted_fault;
 #[cfg(feature = "methods")]
 pub(crate) mod snapped;
 mod tile;
+mod tiles;
 mod triangle;
 mod vertices;
 
@@ -52,6 +54,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::error::Result;
 use crate::host::memory;
 use crate::host::threads::{Locked, on_threads, worth_it};
+use crate::host::vectors::{Plain, with_eight};
 use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
@@ -271,19 +274,27 @@ impl HostRaster {
             let placed = view.placed(mesh, placement);
             let lens = Lens::new(scene.camera, &self.image, &placed, placement.mirrored);
             let before = candidates.len();
-            if mesh.meshlets.len() > 1 && extent(&lens, &self.image, mesh.min, mesh.max).is_none() {
+            if mesh.meshlets.len() > 1
+                && extent(Plain, &lens, &self.image, mesh.min, mesh.max).is_none()
+            {
                 continue;
             }
             memory::reserve(&mut candidates, mesh.meshlets.len(), "meshlets")?;
-            for number in mesh.meshlets.clone() {
+            let index = lenses.len() as u32;
+            with_eight!(eight => for number in mesh.meshlets.clone() {
                 let meshlet = &scene.shapes.meshlets[number as usize];
-                if let Some(extent) = extent(&lens, &self.image, meshlet.min, meshlet.max) {
-                    let lens = lenses.len() as u32;
-                    let groups = (0, meshlet.groups().end);
-                    let copy = *copy;
-                    candidates.push(Candidate { copy, meshlet: number, groups, lens, extent });
+                let extent = extent(eight, &lens, &self.image, meshlet.min, meshlet.max);
+                if let Some(extent) = extent {
+                    let (copy, groups) = (*copy, (0, meshlet.groups().end));
+                    candidates.push(Candidate {
+                        copy,
+                        meshlet: number,
+                        groups,
+                        lens: index,
+                        extent,
+                    });
                 }
-            }
+            });
             if candidates.len() > before {
                 lenses.push(lens);
             }
@@ -320,12 +331,12 @@ impl HostRaster {
             let boxes = &shapes.blocks.parts[meshlet.first_part as usize..];
             let firsts = (0..candidate.groups.1).step_by(PART_GROUPS);
             memory::reserve(&mut parts, firsts.len(), "meshlets")?;
-            for (first, [min, max]) in firsts.zip(boxes) {
-                if let Some(extent) = extent(lens, &self.image, *min, *max) {
+            with_eight!(eight => for (first, [min, max]) in firsts.zip(boxes) {
+                if let Some(extent) = extent(eight, lens, &self.image, *min, *max) {
                     let end = candidate.groups.1.min(first + PART_GROUPS as u32);
                     parts.push(Candidate { groups: (first, end), extent, ..candidate });
                 }
-            }
+            });
         }
         Ok(parts)
     }

@@ -7,6 +7,7 @@
 use crate::error::Result;
 use crate::host::linear::{Vec3, inverse3};
 use crate::host::memory;
+use crate::host::vectors::Plain;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
 use crate::occluders::host_raster::band::Band;
@@ -195,9 +196,9 @@ impl OneByOne {
     /// What may show of a box in the world; `None` if it is surely outside of the view.
     pub(crate) fn extent_of_box(&self, looks: &Looks<'_>, b: &WorldBox) -> Option<Extent> {
         if b.stretch == 0.0 {
-            return extent(&looks.world, &self.image, b.min, b.max);
+            return extent(Plain, &looks.world, &self.image, b.min, b.max);
         }
-        extent_within(&looks.world, &self.image, b.min, b.max, |row, reach| {
+        extent_within(Plain, &looks.world, &self.image, b.min, b.max, |row, reach| {
             let sum = row[0].abs() + row[1].abs() + row[2].abs();
             b.stretch * sum * reach[0].max(reach[1]).max(reach[2])
         })
@@ -211,7 +212,7 @@ impl OneByOne {
     ) -> Option<Extent> {
         let shapes = looks.scene.shapes;
         let meshlet = &shapes.meshlets[meshlet as usize];
-        extent(looks.lens(copy, &self.image), &self.image, meshlet.min, meshlet.max)
+        extent(Plain, looks.lens(copy, &self.image), &self.image, meshlet.min, meshlet.max)
     }
 
     /// Draws a meshlet of a copy, of which `extent` may show.

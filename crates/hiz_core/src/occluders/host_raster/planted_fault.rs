@@ -60,6 +60,8 @@ pub enum RasterFault {
     ClippedInFloat32,
     /// Masks are one row too low.
     MasksShifted,
+    /// Two planes are in order over all of a tile as they are at its first pixel.
+    OrderOfOnePixel,
     /// A layer that is partly hidden keeps its whole mask.
     LayersOverlap,
     /// Mirrored copies keep their winding.

@@ -3,6 +3,7 @@
 //! Their coverage is that of the rasteriser, exactly: the same corners and the same edges.
 
 use crate::error::Result;
+use crate::host::vectors::Plain;
 use crate::input::camera::Camera;
 use crate::input::mesh::FaceCull;
 use crate::occluders::host_raster::edges::{Edges, LARGE, STEP};
@@ -138,7 +139,7 @@ impl Snapped {
 
     /// Which pixels of the tile that begins with this one are covered.
     ///
-    /// Byte l is column l, and its highest bit the first row.
+    /// Byte y is row y, and its lowest bit the first column.
     pub(crate) fn mask(&self, column: i32, row: i32) -> u64 {
         let at = self.edges.at(&self.triangle, column, row);
         let gain = |k: usize| {
@@ -147,10 +148,13 @@ impl Snapped {
         if (0..3).any(|k| at[k] + gain(k) < 0) {
             return 0;
         }
-        self.edges.mask(three(|k| {
-            #[expect(clippy::cast_possible_truncation, reason = "clamped")]
-            let at = at[k].clamp(-LARGE, LARGE) as i32;
-            at
-        }))
+        self.edges.mask(
+            Plain,
+            three(|k| {
+                #[expect(clippy::cast_possible_truncation, reason = "clamped")]
+                let at = at[k].clamp(-LARGE, LARGE) as i32;
+                at
+            }),
+        )
     }
 }

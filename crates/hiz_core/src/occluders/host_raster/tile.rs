@@ -10,8 +10,10 @@
 //! Every way gives the same numbers: a pixel holds the greatest nearness of the planes that cover
 //! its centre.
 
-use crate::occluders::host_raster::lanes::lanes;
-use crate::occluders::host_raster::lens::{greatest, least};
+use std::ops::Range;
+
+use crate::host::vectors::{Eight, with_eight};
+use crate::occluders::host_raster::lanes::{greatest, lanes, least, least_of};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::meshlets::LANES;
 
@@ -23,8 +25,7 @@ const _: () = assert!(SIDE == LANES, "a row of a tile is one group of lanes");
 pub(super) const MOST_LAYERS: usize = 4;
 /// Which pixels of a tile are covered.
 ///
-/// Byte l belongs to column l; its highest bit is the tile's first row.
-/// So a loop over the rows shifts each column's byte, and a loop over lanes becomes vectors.
+/// Byte y belongs to row y; its lowest bit is the tile's first column.
 pub(super) type Mask = u64;
 
 /// A plane of nearness over a tile.
@@ -66,15 +67,50 @@ pub(super) struct Rise {
 /// Where the first of two planes is nearer than the second.
 #[inline(never)]
 fn nearer(plane: &Plane, other: &Plane) -> Mask {
-    // By column, as in `Edges::mask`.
-    let mut is_nearer = [0_u32; SIDE];
-    for row in 0..SIDE {
-        let (a, b) = (plane.row(row), other.row(row));
-        for l in 0..SIDE {
-            is_nearer[l] |= if a[l] > b[l] { 1 << (SIDE - 1 - row) } else { 0 };
+    with_eight!(eight => {
+        let mut is_nearer = 0;
+        for row in 0..SIDE {
+            let bits = eight.greater(&plane.row(row), &other.row(row));
+            is_nearer |= Mask::from(bits) << (SIDE * row);
         }
+        is_nearer
+    })
+}
+
+/// Whether the first of two planes is nearer than the second over all of a tile, or nowhere;
+/// `None` where each pixel has to be asked.
+///
+/// `high` and `other_high` are their greatest values over the tile.
+/// docs/occluders.md has the proof that this is what [`nearer`] finds.
+#[inline(always)]
+pub(super) fn order(
+    (plane, high): (&Plane, f32),
+    (other, other_high): (&Plane, f32),
+    fault: Planted,
+) -> Option<bool> {
+    /// Twice what the roundings amount to at most, as a share of the terms' sizes.
+    const MARGIN: f32 = 8.0 * f32::EPSILON;
+    const LAST: f32 = (SIDE - 1) as f32;
+    let first = plane.nearness - other.nearness;
+    let (mut low, mut top) = (first, first);
+    let mut size = plane.nearness.abs() + other.nearness.abs();
+    for k in 0..2 {
+        let rise = (plane.slope[k] - other.slope[k]) * LAST;
+        low += least(rise, 0.0);
+        top += greatest(rise, 0.0);
+        size += (plane.slope[k].abs() + other.slope[k].abs()) * LAST;
     }
-    Mask::from_le_bytes(lanes(|l| is_nearer[l] as u8))
+    let margin = size * MARGIN + f32::MIN_POSITIVE;
+    if is_planted!(fault, OrderOfOnePixel) {
+        return Some(first > 0.0);
+    }
+    if low > margin && plane.nearest > other_high {
+        Some(true)
+    } else if top < -margin && other.nearest >= high {
+        Some(false)
+    } else {
+        None
+    }
 }
 
 /// A plane where it is the nearest.
@@ -89,14 +125,15 @@ pub(super) struct Layer {
 /// The layers of a tile, of which its state counts those in use.
 pub(super) type Layers = [Layer; MOST_LAYERS];
 
-/// How the depth of a tile is kept: as so many layers, or as [`PIXELS`].
-pub(super) type State = u8;
+/// How the depth of a tile is kept: as so many layers, as [`PIXELS`], or as one plane ([`FULL`]).
+pub(super) type State = u32;
 /// Nothing was drawn.
 pub(super) const CLEAR: State = 0;
-/// One plane in front of everything else covers the tile; the band has its nearness.
-pub(super) const FULL: State = State::MAX - 1;
 /// The tile has pixels.
-pub(super) const PIXELS: State = State::MAX;
+pub(super) const PIXELS: State = MOST_LAYERS as State + 1;
+/// From here on, one plane in front of everything else covers the tile.
+/// What is added is the number of its [`Rise`] in the band.
+pub(super) const FULL: State = PIXELS + 1;
 
 /// A tile with everything that belongs to it.
 pub(super) struct Tile<'a> {
@@ -118,14 +155,9 @@ pub(super) struct Pixels<'a> {
 
 /// One row of a mask: all bits of a lane for a pixel that is covered.
 #[inline(always)]
-fn mask_row(columns: &[u32; SIDE], row: usize) -> [u32; SIDE] {
-    lanes(|l| 0_u32.wrapping_sub(columns[l] >> (SIDE - 1 - row) & 1))
-}
-
-#[inline(always)]
-fn columns_of(mask: Mask) -> [u32; SIDE] {
-    let bytes = mask.to_le_bytes();
-    lanes(|l| u32::from(bytes[l]))
+fn mask_row(mask: Mask, row: usize) -> [u32; SIDE] {
+    let bits = (mask >> (SIDE * row)) as u32;
+    lanes(|l| if bits & (1 << l) == 0 { 0 } else { u32::MAX })
 }
 
 impl Tile<'_> {
@@ -146,13 +178,17 @@ impl Tile<'_> {
         plane: Plane,
         (low, high): (f32, f32),
     ) -> bool {
-        let count = usize::from(*self.state).min(MOST_LAYERS);
+        let count = (*self.state as usize).min(MOST_LAYERS);
         for layer in &self.layers[..count] {
             if layer.mask & mask == 0 || low >= layer.greatest {
                 continue;
             }
             let hidden = if high > layer.least {
-                layer.mask & !nearer(&plane, &layer.plane)
+                match order((&plane, high), (&layer.plane, layer.greatest), self.fault) {
+                    Some(true) => 0,
+                    Some(false) => layer.mask,
+                    None => layer.mask & !nearer(&plane, &layer.plane),
+                }
             } else {
                 layer.mask
             };
@@ -176,7 +212,7 @@ impl Tile<'_> {
                 kept += 1;
             }
         }
-        *self.state = kept as u8;
+        *self.state = kept as State;
         if kept == MOST_LAYERS {
             return false;
         }
@@ -209,15 +245,21 @@ impl Pixels<'_> {
         }
     }
 
-    /// Draws a plane into those that `covered` names row by row; returns the farthest of all.
+    /// Draws a plane into those that `covered` names, row by row of `rows`; returns the farthest of
+    /// all.
     #[inline(always)]
     pub(super) fn draw(
         &mut self,
         plane: &Plane,
+        rows: Range<usize>,
         mut covered: impl FnMut(usize) -> [u32; SIDE],
     ) -> f32 {
         let mut farthest = [f32::MAX; SIDE];
-        for row in 0..SIDE {
+        for row in (0..rows.start).chain(rows.end..SIDE) {
+            let pixels = self.row(row);
+            farthest = lanes(|l| least(pixels[l], farthest[l]));
+        }
+        for row in rows {
             let (covered, nearness) = (covered(row), plane.row(row));
             let pixels = self.row(row);
             for l in 0..SIDE {
@@ -243,18 +285,10 @@ impl Pixels<'_> {
     }
 }
 
-/// The least of a row.
-#[inline(always)]
-fn least_of(v: &[f32; SIDE]) -> f32 {
-    let pair = |i: usize| least(v[i], v[i + 4]);
-    let half = [pair(0), pair(1), pair(2), pair(3)];
-    least(least(half[0], half[2]), least(half[1], half[3]))
-}
-
 /// Whether layers cover all of a tile.
 #[cfg(feature = "methods")]
 pub(super) fn is_covered(state: State, layers: &Layers) -> bool {
-    let used = &layers[..usize::from(state).min(MOST_LAYERS)];
+    let used = &layers[..(state as usize).min(MOST_LAYERS)];
     used.iter().fold(0, |covered, layer| covered | layer.mask) == Mask::MAX
 }
 
@@ -266,7 +300,7 @@ pub(super) fn row_of_layers(
     row: usize,
     fault: Planted,
 ) -> [f32; SIDE] {
-    match usize::from(state) {
+    match state as usize {
         0 => [0.0; SIDE],
         1 if layers[0].mask == Mask::MAX => {
             // What lies beyond the far plane has no depth.
@@ -277,7 +311,7 @@ pub(super) fn row_of_layers(
         count => {
             let mut out = [0.0; SIDE];
             for layer in &layers[..count.min(MOST_LAYERS)] {
-                let covered = mask_row(&columns_of(layer.mask), row);
+                let covered = mask_row(layer.mask, row);
                 let nearness = layer.plane.row(row);
                 for l in 0..SIDE {
                     // The layers' masks have no pixel in common.

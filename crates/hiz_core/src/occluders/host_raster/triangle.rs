@@ -2,8 +2,8 @@
 
 use crate::host::linear::sub;
 use crate::input::mesh::FaceCull;
-use crate::occluders::host_raster::lanes::three;
-use crate::occluders::host_raster::lens::{Image, UNITS, greatest, least, rounded};
+use crate::occluders::host_raster::lanes::{greatest, least, three};
+use crate::occluders::host_raster::lens::{Image, UNITS, rounded};
 use crate::occluders::host_raster::planted_fault::is_planted;
 
 /// Planes that rise more from pixel to pixel are no planes.

@@ -6,8 +6,8 @@
 use std::ops::Range;
 
 use crate::input::mesh::FaceCull;
-use crate::occluders::host_raster::lanes::three;
-use crate::occluders::host_raster::lens::{HALF, Image, LEAST_W, Lens, greatest, least, rounded};
+use crate::occluders::host_raster::lanes::{greatest, lanes, least, three};
+use crate::occluders::host_raster::lens::{HALF, Image, LEAST_W, Lens, rounded};
 use crate::occluders::host_raster::planted_fault::is_planted;
 use crate::occluders::host_raster::triangle::Corner;
 use crate::occluders::meshlets::{Blocks, LANES, MAX_TRIANGLES, MAX_VERTICES, Meshlet};
@@ -61,13 +61,12 @@ impl Vertices {
             blocks.low.each_ref().map(|axis| axis[first..][..groups * LANES].as_chunks().0)
         });
         for group in 0..groups {
-            let from_eye: [[f32; LANES]; 3] = std::array::from_fn(|k| {
+            let from_eye = three(|k| {
                 let (hi, lo) = (lens.eye_hi[k], lens.eye_lo[k]);
+                let high = &high[k][group];
                 match &low {
-                    None => high[k][group].map(|v: f32| (v - hi) - lo),
-                    Some(low) => {
-                        std::array::from_fn(|i| (high[k][group][i] - hi) + (low[k][group][i] - lo))
-                    }
+                    None => lanes(|i| (high[i] - hi) - lo),
+                    Some(low) => lanes(|i| (high[i] - hi) + (low[k][group][i] - lo)),
                 }
             });
             self.project_group(group, &from_eye, lens, image);
@@ -138,10 +137,11 @@ impl Vertices {
         let mut kept = 0;
         for (group, corners) in (groups.start as u8..).zip(corners) {
             let of = |values: &PerVertex<f32>| {
-                corners.map(|c| c.map(|v| values[usize::from(v) % MAX_VERTICES]))
+                three(|k| lanes(|i| values[usize::from(corners[k][i]) % MAX_VERTICES]))
             };
             let ([x0, x1, x2], [y0, y1, y2]) = (of(&self.x), of(&self.y));
-            let [c0, c1, c2] = corners.map(|c| c.map(|v| self.code[usize::from(v) % MAX_VERTICES]));
+            let [c0, c1, c2] =
+                three(|k| lanes(|i| self.code[usize::from(corners[k][i]) % MAX_VERTICES]));
             let mut keep = [0_u32; LANES];
             for i in 0..LANES {
                 let outside = (c0[i] & c1[i] & c2[i]) & !CLIP;
