@@ -488,7 +488,7 @@ fn kept_staging_buffers_leave_nothing_of_earlier_uploads() {
         let options = InstanceOptions { order, ..InstanceOptions::default() };
         let made = engine().instances(&Bounds::Boxes { min, max }, &options).unwrap();
         engine().wait().unwrap();
-        words::pieces(engine(), &made).unwrap().swap_remove(0)
+        words::pieces(&engine(), &made).unwrap().swap_remove(0)
     };
     for order in ORDERS {
         let whole = upload(30 * ROW, order);
