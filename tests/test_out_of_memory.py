@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(
         ("occluders", 64),
         ("convert", 64),
         ("upload", 16),
-        ("upload", 300),
+        ("upload", 250),
         ("render", 128),
     ],
 )
@@ -53,4 +53,5 @@ def test_a_cull_without_memory_for_all_levels_in_one_texture_goes_on() -> None:
         check=False,
     )
     assert run.returncode == 0, run.stderr
-    assert run.stdout.splitlines()[-2:] == ["no error: 0", "next device: [True, False]"]
+    told = "no error: 0 kept, 0 bytes copied beside 2000000 others"
+    assert run.stdout.splitlines()[-2:] == [told, "next device: [True, False]"]

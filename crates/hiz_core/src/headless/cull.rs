@@ -171,10 +171,22 @@ impl Engine {
         reading: Reading,
         extras: &CullExtras<'_>,
     ) -> Result<Culling> {
+        self.cull_after(Vec::new(), question, outputs, reading, extras)
+    }
+
+    /// [`Engine::cull_with`], whose submission begins with the commands `before`.
+    pub(super) fn cull_after(
+        &self,
+        mut before: Vec<wgpu::CommandBuffer>,
+        question: &Question<'_>,
+        outputs: &Outputs,
+        reading: Reading,
+        extras: &CullExtras<'_>,
+    ) -> Result<Culling> {
         self.check_process()?;
         let Question { instances, camera, pyramid, options, .. } = *question;
         let gpu = &self.context().gpu;
-        let attempt = || {
+        let mut attempt = || {
             let (start, made_before) = (Instant::now(), PipelinesMade::so_far());
             let buffers = self.answers().lend(self.context(), instances, outputs)?;
             let visible = Arc::clone(&buffers.visible);
@@ -195,11 +207,11 @@ impl Engine {
             })?;
             let watches = &mut instances.watches();
             let at = Instant::now();
-            let index = self.queue().submit([encoder.finish()]);
+            let index = self.queue().submit(before.drain(..).chain([encoder.finish()]));
             watches.add(&recorded.watch);
             Ok(question.submitted(self, recorded, &Submission { index, at, done, timings, times }))
         };
-        let culling = self.scoped(attempt);
+        let culling = self.scoped(&mut attempt);
         let Err(error) = &culling else { return culling };
         self.answers().forget();
         let had_atlas = pyramid.forget();

@@ -29,6 +29,13 @@ const DEPTH_KEPT_BYTES: u64 = 1 << 25;
 const DEPTH_SIZES: usize = 2;
 const DEPTH_KEPT: usize = 2;
 
+/// Bytes of a block of memory that wgpu takes from a processor that serves as device, and keeps.
+///
+/// Records of 4 million boxes fit one.
+/// Their pages are then new to the process once, and not at every upload (`docs/performance.md`).
+/// It is the most that wgpu takes at once.
+const PROCESSOR_BLOCK_BYTES: u64 = 256 << 20;
+
 /// A device, its queue and the pipelines on it.
 /// The last clone waits until the device is idle, and releases it.
 ///
@@ -159,6 +166,7 @@ impl Engine {
             label: Some("hiz.device"),
             required_features: features,
             required_limits: adapter.limits(),
+            memory_hints: memory_hints(&adapter.get_info()),
             ..Default::default()
         }))
         .map_err(|e| adapter::no_adapter(format!("would open: {summary}: {e}"), &seen))?;
@@ -325,5 +333,21 @@ impl Engine {
             return Err(Error::Device(error));
         }
         result
+    }
+}
+
+/// How large the blocks are that wgpu cuts buffers and textures from.
+///
+/// Vulkan's software drivers take memory as the host's programs do: what was never written costs
+/// nothing.
+/// So blocks may be large there.
+fn memory_hints(adapter: &wgpu::AdapterInfo) -> wgpu::MemoryHints {
+    match (adapter.device_type, adapter.backend) {
+        (wgpu::DeviceType::Cpu, wgpu::Backend::Vulkan) => {
+            // Such a driver's memory is the host's, whose blocks are half as large.
+            let bytes = 2 * PROCESSOR_BLOCK_BYTES;
+            wgpu::MemoryHints::Manual { suballocated_device_memory_block_size: bytes..bytes }
+        }
+        _ => wgpu::MemoryHints::default(),
     }
 }

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use crate::cull::options::{CullOptions, Hierarchy};
 use crate::error::Result;
 use crate::headless::counts::Counts;
+use crate::headless::cull::{CullExtras, Question, Reading};
 use crate::headless::culling::Culling;
 use crate::headless::depth_image::DepthImage;
 use crate::headless::engine::Engine;
@@ -126,8 +127,13 @@ impl Engine {
             let part = bounds.part(&(start..count.min(start + PART)));
             let outputs = Outputs { mask: true, verdicts: start == 0, ..Outputs::NONE };
             let has_groups = options.hierarchy == Hierarchy::Always;
-            let instances = self.instances_for(&part, &upload, has_groups)?;
-            on_device.push_back(self.cull(&instances, camera, pyramid, &options, &outputs)?);
+            // One submission for both: each takes as long as thousands of tests.
+            let (instances, copies) = self.instances_for_one(&part, &upload, has_groups)?;
+            let question =
+                Question { instances: &instances, camera, pyramid, options: &options, among: None };
+            let extras = CullExtras::default();
+            let culling = self.cull_after(copies, &question, &outputs, Reading::Staged, &extras)?;
+            on_device.push_back(culling);
         }
         while !on_device.is_empty() {
             answer.take(&mut on_device)?;

@@ -24,16 +24,6 @@ impl Engine {
         bounds: &Bounds<'_>,
         options: &InstanceOptions<'_>,
     ) -> Result<Arc<Instances>> {
-        self.instances_for(bounds, options, true)
-    }
-
-    /// [`Engine::instances`], without groups for a single cull that tests none.
-    pub(super) fn instances_for(
-        &self,
-        bounds: &Bounds<'_>,
-        options: &InstanceOptions<'_>,
-        has_groups: bool,
-    ) -> Result<Arc<Instances>> {
         // One part is copied while the next one is packed.
         // So no more than two have a staging buffer at a time.
         let mut before = None;
@@ -45,7 +35,27 @@ impl Engine {
             if before.is_some() && more { readback::wait(self.device(), before) } else { Ok(()) }
         };
         let gpu = &self.context().gpu;
-        self.scoped(|| Instances::new(gpu, bounds, options, has_groups, copy)).map(Arc::new)
+        self.scoped(|| Instances::new(gpu, bounds, options, true, copy)).map(Arc::new)
+    }
+
+    /// [`Engine::instances`] for a single cull, and the commands that have to run before it.
+    /// Without groups, the cull tests none.
+    pub(super) fn instances_for_one(
+        &self,
+        bounds: &Bounds<'_>,
+        options: &InstanceOptions<'_>,
+        has_groups: bool,
+    ) -> Result<(Arc<Instances>, Vec<wgpu::CommandBuffer>)> {
+        let mut commands = Vec::new();
+        let copy = |copies: &dyn Fn(&mut wgpu::CommandEncoder), _: bool| {
+            let mut encoder = self.encoder("hiz.instances.encoder");
+            copies(&mut encoder);
+            commands.push(encoder.finish());
+            Ok(())
+        };
+        let gpu = &self.context().gpu;
+        let made = self.scoped(|| Instances::new(gpu, bounds, options, has_groups, copy))?;
+        Ok((Arc::new(made), commands))
     }
 
     /// Replaces the bounds of instances `first..first + n`: it records and submits.

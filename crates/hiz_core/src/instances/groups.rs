@@ -33,17 +33,22 @@ const PARALLEL_FROM: usize = 1 << 14;
 /// Groups that one thread packs at a time.
 const PART: usize = 64;
 
-/// Runs `work` on the parts of `count` instances, on all cores where that pays.
+/// How many threads pack so many instances.
+fn threads_for(count: usize) -> usize {
+    if count < PARALLEL_FROM { 1 } else { cores() }
+}
+
+/// Runs `work` on the parts, on at most so many threads.
 /// The first error is returned.
 fn on_parts<T: Send>(
-    count: usize,
+    threads: usize,
     parts: impl IntoIterator<Item = T, IntoIter: Send>,
     work: impl Fn(T, &mut Batch) -> Result<()> + Sync,
 ) -> Result<()> {
     let failed: Locked<Option<Error>> = Locked::default();
     // One for each thread, however many parts it packs.
     let spare_batches: Locked<Vec<Box<Batch>>> = Locked::default();
-    on_threads(if count < PARALLEL_FROM { 1 } else { cores() }, parts, |part| {
+    on_threads(threads, parts, |part| {
         let mut batch = spare_batches.lock().pop().unwrap_or_else(|| Box::new(Batch::new()));
         if let Err(error) = work(part, &mut batch) {
             failed.lock().get_or_insert(error);
@@ -54,14 +59,20 @@ fn on_parts<T: Send>(
 }
 
 /// Writes the records of instances that are culled one by one, once: no groups are formed.
+///
+/// `shares_cores`: meanwhile the device culls other instances on the same cores.
+/// Half of them are enough then, and every thread less is one less to wait for.
 pub(crate) fn pack_without_groups(
+    shares_cores: bool,
     (bounds, kind): (&Bounds<'_>, BoundsKind),
     places: Range<usize>,
     source: impl Fn(usize) -> Origin + Sync,
     records: &Mapped<'_>,
 ) -> Result<()> {
     let parts = places.clone().step_by(PART * GROUP);
-    on_parts(places.len(), parts, |first: usize, batch| {
+    let threads = threads_for(places.len());
+    let threads = if shares_cores { threads.div_ceil(2) } else { threads };
+    on_parts(threads, parts, |first: usize, batch| {
         let part = first..places.end.min(first + PART * GROUP);
         let mut view = records.range(bytes_of(&part, places.start, kind))?;
         let mut rest = view.slice(..);
@@ -168,7 +179,8 @@ impl Groups {
         let (count, absent) = (self.count, &self.absent);
         let places = range.start * GROUP..count.min(range.end * GROUP);
         let parts = range.clone().step_by(PART).zip(self.groups[range].chunks_mut(PART));
-        on_parts(places.len(), parts, |(begin, groups): (usize, &mut [Group]), batch| {
+        let threads = threads_for(places.len());
+        on_parts(threads, parts, |(begin, groups): (usize, &mut [Group]), batch| {
             let part = begin * GROUP..places.end.min((begin + groups.len()) * GROUP);
             let mut view = records.range(bytes_of(&part, places.start, kind))?;
             let mut rest = view.slice(..);
@@ -263,7 +275,8 @@ impl Groups {
             parts.push((begin, &places[begin..end], first_group, groups));
             (rest, begin, first_group) = (behind, end, end_group);
         }
-        on_parts(places.len(), parts, |(begin, places, first_group, groups), batch| {
+        let threads = threads_for(places.len());
+        on_parts(threads, parts, |(begin, places, first_group, groups), batch| {
             let end = begin + places.len();
             let bytes = begin as u64 * record_bytes..end as u64 * record_bytes;
             let mut view = records.range(bytes)?;

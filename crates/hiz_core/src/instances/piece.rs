@@ -159,7 +159,7 @@ pub(super) fn packed(
                 let of_band = begin / GROUP..places.end.div_ceil(GROUP);
                 groups.pack((bounds, kind), of_band, source, staged)
             } else {
-                pack_without_groups((bounds, kind), places, source, staged)
+                pack_without_groups(gpu.is_processor(), (bounds, kind), places, source, staged)
             }
         })?;
         uploads.push(upload);

@@ -51,7 +51,7 @@ pub(crate) struct Upload {
 
 /// The most bytes that are staged at once, of records that are more.
 ///
-/// Such buffers lie in a block of 64 MiB that wgpu keeps.
+/// Such buffers lie in a block of at least 64 MiB that wgpu keeps.
 /// A buffer as large as the block has memory of its own, all of whose pages are new to the process.
 const STAGED: u64 = 16 << 20;
 /// From this many bytes on, records are staged in several buffers.
