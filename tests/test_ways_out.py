@@ -287,6 +287,22 @@ def test_a_word_that_is_no_parameter(call: Callable[[], Any], word: str, meant: 
     assert ("the closest is" in str(refused.value)) == (meant is not None)
 
 
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("world_to_camera", "camera_from_world"),
+        ("world2cam", "camera_from_world"),
+        ("camera_to_world", "world_from_camera"),
+        ("cam2world", "world_from_camera"),
+    ],
+)
+@pytest.mark.parametrize("make", [hizvk.Camera.from_opengl, hizvk.Camera.from_matrices])
+def test_the_word_for_a_pose_is_not_its_inverse(make: Any, word: str, meant: str) -> None:
+    """By letters alone ``world_from_camera`` is closest to ``world_to_camera``."""
+    with pytest.raises(TypeError, match=f"^{word}: .*the closest is {meant}, and all are"):
+        make(**{word: np.eye(4)})
+
+
 def look_at(**more: Any) -> hizvk.Camera:
     return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), **more)
 
