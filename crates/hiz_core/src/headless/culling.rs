@@ -262,11 +262,15 @@ impl Culling {
 
     /// The packed list of the kept instances' indices, all pieces joined.
     /// If the cull did not write it, it is made from its mask, ascending.
+    /// Of bins it has what they list, ascending; [`Culling::bin`] has the list of one.
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for a cull without indices and mask.
     /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn indices(&self) -> Result<Vec<u32>> {
+        if let Some(bins) = self.visible.bins.as_ref().filter(|_| self.visible.outputs().indices) {
+            return self.indices_of_bins(bins);
+        }
         let lists = match &self.visible.lists {
             Some(lists) if self.visible.outputs().indices && lists.copied.is_none() => lists,
             _ => self.later_lists("indices")?,
