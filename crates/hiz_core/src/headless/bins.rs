@@ -14,6 +14,8 @@ pub const NO_LOD: u8 = u8::MAX;
 impl Culling {
     /// The bins of the cull.
     pub(super) fn bins(&self) -> Result<&Bins> {
+        let is_missing = self.visible.bins.is_none() && !self.visible.outputs().emit.is_one_list();
+        self.require("draws or indices", !is_missing)?;
         self.visible.bins.as_ref().ok_or_else(|| {
             Error::mismatch("outputs", "expected a cull with Emit::Binned or Emit::Instances")
         })

@@ -107,6 +107,42 @@ fn indices_are_those_of_the_bins() {
     }
 }
 
+/// A mask tells neither bins nor what a capacity cuts of them.
+#[test]
+fn what_a_mask_does_not_tell_of_bins_is_refused() {
+    let world = World::new(&[]);
+    let lods = [2, 3];
+    let made = Crowd::random(200, &lods, 0.5, 0.1, &mut Random(10));
+    let crowd = Crowd::new(&world, made, None, true);
+    let World { engine, camera, pyramid, .. } = &world;
+    let options = CullOptions::default();
+    let expected = "expected a cull that was asked for ";
+    for emit in emits(&world.table(&lods, true)) {
+        let cull = |outputs: Outputs| {
+            engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap()
+        };
+        let alone = cull(Outputs { mask: true, emit: emit.clone(), ..Outputs::NONE });
+        for error in [
+            alone.draws().unwrap_err(),
+            alone.draw_counts().unwrap_err(),
+            alone.lods().unwrap_err(),
+            alone.bin(0, 0).unwrap_err(),
+        ] {
+            assert!(
+                error
+                    .to_string()
+                    .contains(&format!("{expected}draws or indices, got one with mask"))
+            );
+        }
+        let kept = crowd.made.iter().filter(|made| made.is_kept()).count();
+        assert_eq!(alone.indices().unwrap().len(), kept);
+        let drawn = Outputs { mask: true, draws: true, capacity: Some(9), emit, ..Outputs::NONE };
+        let error = cull(drawn.clone()).indices().unwrap_err().to_string();
+        assert!(error.contains(&format!("{expected}indices, got one with mask, draws")), "{error}");
+        assert_eq!(cull(Outputs { capacity: None, ..drawn }).indices().unwrap().len(), kept);
+    }
+}
+
 /// What the cull's own submission copies holds bins, too, so no read of them waits.
 #[test]
 fn bins_arrive_with_the_cull() {
