@@ -120,6 +120,29 @@ def test_a_capacity_cuts_the_coarsest(device: hizvk.Device, scene: Scene) -> Non
     np.testing.assert_array_equal(seen.mask, whole.mask)
 
 
+@pytest.mark.parametrize("wait", [True, False])
+@pytest.mark.parametrize("outputs", [["indices"], ["indices", "mask"]])
+def test_indices_are_what_the_bins_list(
+    device: hizvk.Device, scene: Scene, outputs: Any, wait: bool
+) -> None:
+    """Also where a capacity cuts the coarsest, and where there is no mask to make them from."""
+    at = (scene.crowd, scene.camera, scene.pyramid)
+    for capacity in (None, 200):
+        seen = device.cull(
+            *at, meshes=_meshes(), lod=RULE, capacity=capacity, outputs=outputs, wait=wait
+        )
+        listed = [seen.bin(mesh=m, lod=k) for m, n in enumerate(LODS) for k in range(n)]
+        np.testing.assert_array_equal(seen.indices, np.sort(np.concatenate(listed)))
+
+
+def test_a_mask_tells_no_bins(device: hizvk.Device, scene: Scene) -> None:
+    at = (scene.crowd, scene.camera, scene.pyramid)
+    seen = device.cull(*at, meshes=_meshes(), lod=RULE, outputs=["mask"])
+    for read in (lambda: seen.draws, lambda: seen.lods, lambda: seen.bin(mesh=0, lod=0)):
+        with pytest.raises(ValueError, match="asked for draws or indices, got one with mask"):
+            read()
+
+
 def test_any_order_is_for_one_mesh(device: hizvk.Device, scene: Scene) -> None:
     crowd = device.instances(scene.bounds)
     at = (crowd, scene.camera, scene.pyramid)
