@@ -104,7 +104,7 @@ def test_a_draw_for_each_instance(device: hizvk.Device, scene: Scene) -> None:
     assert draws["first_instance"].tolist() == list(range(len(kept)))
     np.testing.assert_array_equal(draws["index_count"], 100 * scene.ids[kept] + lods[kept] + 1)
     assert not seen.draws[len(kept) :].view(np.uint8).any()
-    with pytest.raises(ValueError, match="expected Emit::Binned, got Emit::Instances"):
+    with pytest.raises(ValueError, match='expected emit="bins", got emit="instances"'):
         seen.bin(mesh=0, lod=0)
 
 
@@ -153,10 +153,10 @@ def test_any_order_is_for_one_mesh(device: hizvk.Device, scene: Scene) -> None:
         expected = whole.bin(mesh=0, lod=k)
         assert np.sort(seen.bin(mesh=0, lod=k)).tolist() == expected.tolist()
         assert seen.draws["instance_count"][k] == len(expected)
-    with pytest.raises(ValueError, match="order: expected Order::Stable"):
+    with pytest.raises(ValueError, match='order: expected "stable", got "any"'):
         device.cull(*at, meshes=tree, order="any")
     at = (scene.crowd, scene.camera, scene.pyramid)
-    with pytest.raises(ValueError, match="order: expected Order::Stable"):
+    with pytest.raises(ValueError, match='order: expected "stable", got "any"'):
         device.cull(*at, meshes=_meshes(), order="any", placement="reserved")
     with pytest.raises(ValueError, match="order: expected a cull in a stable order"):
         seen.lods  # noqa: B018
@@ -189,6 +189,6 @@ def test_scales_and_errors_choose_levels(device: hizvk.Device) -> None:
 def test_a_cull_without_meshes_has_no_bins(device: hizvk.Device, scene: Scene) -> None:
     seen = device.cull(scene.crowd, scene.camera, scene.pyramid)
     for read in (lambda: seen.lods, lambda: seen.bin(mesh=0, lod=0)):
-        with pytest.raises(ValueError, match="outputs: expected a cull with Emit::Binned"):
+        with pytest.raises(ValueError, match="outputs: expected a cull with meshes"):
             read()
     assert seen.draw_count == 1

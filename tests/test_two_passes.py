@@ -172,7 +172,7 @@ def test_what_is_refused_is_named(device: hizvk.Device) -> None:
     crowd = device.instances(hizvk.Spheres([[0, 0, -5.0]], 1.0))
     culler = device.temporal(crowd)
     depth = np.full(SIZE, np.inf)
-    with pytest.raises(ValueError, match="order: expected Stable"):
+    with pytest.raises(ValueError, match='order: expected "stable"'):
         culler.late(view, depth, kind="z", order="any")
     with pytest.raises(ValueError, match=r"guard_px: .* 9/256 for 4 bits"):
         culler.late(view, depth, kind="z", coverage="sample")

@@ -17,7 +17,10 @@ impl Culling {
         let is_missing = self.visible.bins.is_none() && !self.visible.outputs().emit.is_one_list();
         self.require("draws or indices", !is_missing)?;
         self.visible.bins.as_ref().ok_or_else(|| {
-            Error::mismatch("outputs", "expected a cull with Emit::Binned or Emit::Instances")
+            Error::mismatch(
+                "outputs",
+                "expected a cull with meshes, by Emit::Binned or Emit::Instances",
+            )
         })
     }
 
