@@ -1,6 +1,7 @@
 """What newcomers pass at first: it is taken, or the message ends with the way out."""
 
 import pickle
+import re
 import subprocess
 import sys
 import warnings
@@ -287,6 +288,22 @@ def test_a_word_that_is_no_parameter(call: Callable[[], Any], word: str, meant: 
     assert ("the closest is" in str(refused.value)) == (meant is not None)
 
 
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("world_to_camera", "camera_from_world"),
+        ("world2cam", "camera_from_world"),
+        ("camera_to_world", "world_from_camera"),
+        ("cam2world", "world_from_camera"),
+    ],
+)
+@pytest.mark.parametrize("make", [hizvk.Camera.from_opengl, hizvk.Camera.from_matrices])
+def test_the_word_for_a_pose_is_not_its_inverse(make: Any, word: str, meant: str) -> None:
+    """By letters alone ``world_from_camera`` is closest to ``world_to_camera``."""
+    with pytest.raises(TypeError, match=f"^{word}: .*the closest is {meant}, and all are"):
+        make(**{word: np.eye(4)})
+
+
 def look_at(**more: Any) -> hizvk.Camera:
     return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), **more)
 
@@ -378,3 +395,46 @@ def test_a_number_past_the_end_says_what_may_be_meant(device: hizvk.Device) -> N
     nothing = culled(device, instances=device.instances(hizvk.Spheres([], [])))
     with pytest.raises(IndexError, match=r"nothing, for there are no instances, got 0$"):
         nothing.explain(0)
+
+
+#: Refusals of the engine, whose own interface has other names than this one.
+REFUSED_BY_THE_ENGINE: list[Callable[[hizvk.Device, dict[str, hizvk.Pyramid]], object]] = [
+    lambda device, of: device.cull(device.instances(BALLS), CAMERA, of["nearest"]),
+    lambda device, of: device.cull(device.instances(BALLS), CAMERA, of["receivers"]),
+    lambda device, of: device.cull(device.instances(BALLS), CAMERA, of["both"], shadow=SUN),
+    lambda device, of: device.cull(
+        device.instances(BALLS), CAMERA, of["receivers"], shadow=SUN, outputs=["pixels"]
+    ),
+    lambda device, of: device.cull(
+        device.instances(BALLS), CAMERA, of["receivers"], shadow=SUN, fit="volume"
+    ),
+    lambda device, of: device.cull(
+        device.instances(BALLS), CAMERA, of["receivers"], shadow=SUN
+    ).explain(0),
+    lambda device, of: device.cull_approximate(
+        device.instances(BALLS), CAMERA, of["nearest"], negligible_px=1
+    ),
+    lambda device, of: device.temporal(device.instances(BALLS)).late(
+        CAMERA, of["both"], order="any"
+    ),
+    lambda device, of: device.temporal(device.instances(BALLS)).late(
+        CAMERA, of["receivers"], shadow=SUN
+    ),
+    lambda device, _: culled(device, meshes=[MESH], order="any"),
+    lambda device, _: culled(device, meshes=[MESH], emit="instances").bin(mesh=0, lod=0),
+    lambda device, _: culled(device).lods,
+]
+SUN = hizvk.DirectionalLight((0, -1, 0), receivers=((-9, -9, -9), (9, 9, 9)))
+MESH = hizvk.MeshLods([hizvk.DrawTemplate(3)])
+
+
+@pytest.mark.parametrize("call", REFUSED_BY_THE_ENGINE)
+def test_refusals_speak_of_this_interface(device: hizvk.Device, call: Any) -> None:
+    """``Depths::Farthest``, ``Order::Any`` or `record_cull` are no words of Python."""
+    depths: Any
+    pyramids = {}
+    for depths in ("nearest", "both", "receivers"):
+        pyramids[depths] = device.pyramid(DEPTH, CAMERA, kind="z", depths=depths)
+    with pytest.raises(ValueError, match=r"^\w+: expected ") as refused:
+        call(device, pyramids)
+    assert not re.search(r"::|record_|\b(Stable|Any|Binned)\b", str(refused.value))

@@ -121,6 +121,13 @@ _MEANT: Final[Mapping[str, tuple[str, ...]]] = {
     **dict.fromkeys(("at", "lookat", "look_at", "direction", "forward"), ("target",)),
     **dict.fromkeys(("znear", "z_near", "near_plane", "clip_start"), ("near",)),
     **dict.fromkeys(("zfar", "z_far", "far_plane", "clip_end"), ("far",)),
+    # The closest word would be the inverse.
+    **dict.fromkeys(
+        ("world_to_camera", "world_to_cam", "world2camera", "world2cam"), ("camera_from_world",)
+    ),
+    **dict.fromkeys(
+        ("camera_to_world", "cam_to_world", "camera2world", "cam2world"), ("world_from_camera",)
+    ),
     # Of meshes and points.
     **dict.fromkeys(("faces", "indices"), ("triangles",)),
     **dict.fromkeys(("points", "xyz"), ("positions", "vertices")),

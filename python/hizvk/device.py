@@ -708,10 +708,10 @@ class Device(StaysInProcess):
             are read.
             For several cameras indices and draws are those of what any of them keeps, and made only
             if they are named here.
-        among : (N,) bool array, CullResult or ViewsResult; optional
-            The instances that are asked for: a mask, what an earlier cull of them has kept, or what
-            any of its views has kept.
-            An earlier result stays on the device, and it must have a mask.
+        among : (N,) bool array, CullResult, ViewsResult or PassResult; optional
+            The instances that are asked for: a mask, what an earlier cull of them has kept, what
+            any of its views has kept, or what a pass of `Temporal` draws.
+            The result of an earlier cull stays on the device, and it must have a mask.
             All others are not kept, their verdict is `Verdict.OUTSIDE`, and they cost no test.
             None: all.
         wait : bool

@@ -318,6 +318,7 @@ class CullOptions:
         Whether to count the tests on each level and the texels that they read; this is slower.
     lod : LodByError, LodByDistance or LodBySize, optional
         Which level of detail of its mesh a kept instance is drawn with.
+        It says nothing without `Outputs.meshes`.
         None: the full mesh, LOD 0.
     shadow : DirectionalLight, optional
         The instances are shadow casters of this light, and kept is what may shadow something that

@@ -131,7 +131,10 @@ class CullResult(PicturedResult, Awaited[CoreCulling]):
 
     @cached_property
     def indices(self) -> npt.NDArray[np.uint32]:
-        """``(count,)`` uint32: the list of kept instances; ascending for ``order="stable"``."""
+        """``(count,)`` uint32: the list of kept instances; ascending for ``order="stable"``.
+
+        With ``meshes=`` it is what all bins list, ascending; `bin` has the list of one.
+        """
         return shared(self._inner.indices())  # type: ignore[no-any-return]
 
     @cached_property
@@ -141,6 +144,14 @@ class CullResult(PicturedResult, Awaited[CoreCulling]):
         There is one record for each piece of the instances (`Instances.num_pieces`).
         With ``meshes=``, each piece has as many records as it could need, and zeros follow those
         that draw something (`draw_count`).
+        Their ``first_instance`` counts in the list on the device, where one bin follows another,
+        and not in `indices`.
+
+        Raises
+        ------
+        ValueError
+            If the cull was not asked for draws, and cannot make them of its mask: with ``meshes=``
+            it cannot.
         """
         return np.frombuffer(self._inner.draws(), dtype=DRAW_DTYPE)
 
@@ -160,7 +171,8 @@ class CullResult(PicturedResult, Awaited[CoreCulling]):
         Raises
         ------
         ValueError
-            If the cull was not given ``meshes=``, or had ``order="any"``.
+            If the cull was not given ``meshes=``, was asked for neither draws nor indices, or had
+            ``order="any"``.
         """
         return shared(self._inner.lods())  # type: ignore[no-any-return]
 

@@ -197,7 +197,7 @@ class Temporal(Allocated[CoreTwoPasses]):
             How the cull decides; None takes the defaults.
             ``order="any"`` is refused, because two passes list from their masks.
             ``lod`` is refused, because masks do not tell levels of detail.
-            `Device.cull` with ``meshes=``, ``lod=`` and ``among=pass.mask`` lists a pass by level.
+            `Device.cull` with ``meshes=``, ``lod=`` and ``among=late`` lists a pass by level.
         **keywords
             Any field of `CullOptions`, which takes the place of that of `options`.
 
@@ -221,7 +221,7 @@ class Temporal(Allocated[CoreTwoPasses]):
             raise ValueError(
                 "lod: expected None, because the passes answer masks, which tell no levels of "
                 f"detail, got {chosen.lod!r}; list what a pass draws by level with "
-                "Device.cull(..., meshes=, lod=, among=late.mask)"
+                "Device.cull(..., meshes=, lod=, among=late)"
             )
         pyramid = self._pyramid(camera, depth, kind, scale, invalid, levels)
         if pyramid.camera != camera:

@@ -20,6 +20,7 @@ from .camera import Camera
 from .pictured import PicturedViews
 from .resources import Pyramid
 from .result import DRAW_DTYPE, CullResult, shared
+from .temporal import PassResult
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from .hints import Question
     from .resources import Instances
 
-    _AmongLike: TypeAlias = "npt.ArrayLike | CullResult | ViewsResult"
+    _AmongLike: TypeAlias = "npt.ArrayLike | CullResult | ViewsResult | PassResult"
 
 __all__ = ["ViewsResult", "among_of", "pairs"]
 
@@ -188,13 +189,16 @@ def among_of(
     count = len(instances)
     if among is None:
         return None
+    if isinstance(among, PassResult):
+        check_owner("among", among, device)
+        among = among.mask
     if isinstance(among, (CullResult, ViewsResult)):
         check_owner("among", among, device)
         of = len(among) if isinstance(among, CullResult) else among.num_instances
         if of != count:
             raise ValueError(f"among: expected a result of {count} instances, got one of {of}")
         return among._inner
-    expected = f"a bool ({count},) array, a CullResult or a ViewsResult"
+    expected = f"a bool ({count},) array, a CullResult, ViewsResult or PassResult"
     if _arguments.is_masked(among):
         raise TypeError(
             f"among: expected {expected}, got a masked array; "

@@ -269,7 +269,11 @@ TABLES: dict[str, Table] = {
             "options": OPTIONS_OBJECT,
             "outputs": OUTPUTS_OBJECT,
             "among": [
-                ("all", TypeError, "expected a bool (1,) array, a CullResult or a ViewsResult"),
+                (
+                    "all",
+                    TypeError,
+                    "expected a bool (1,) array, a CullResult, ViewsResult or PassResult",
+                ),
                 ([0], TypeError, "got (1,) int64"),
                 ([True, False], ValueError, "got (2,) bool"),
                 ([[True]], ValueError, "got (1, 1) bool"),

@@ -53,7 +53,7 @@ pub(crate) fn raised(py: Python<'_>, error: Error) -> PyErr {
         Error::Limit { name, requested, allowed } => LIMIT.raise(py, (name, requested, allowed)),
         Error::DeviceLost(_) => DEVICE_LOST.raise(py, (text,)),
         Error::OutOfMemory(_) => OUT_OF_MEMORY.raise(py, (text,)),
-        Error::Invalid { .. } | Error::Mismatch { .. } => PyValueError::new_err(text),
+        Error::Invalid { .. } | Error::Mismatch { .. } => PyValueError::new_err(in_python(text)),
         _ => hiz_error(py, text),
     }
 }
@@ -61,4 +61,34 @@ pub(crate) fn raised(py: Python<'_>, error: Error) -> PyErr {
 /// A plain `HizError`.
 pub(crate) fn hiz_error(py: Python<'_>, text: String) -> PyErr {
     HIZ_ERROR.raise(py, (text,))
+}
+
+/// Names of the engine's interface that its messages hold, and what Python calls them.
+/// Names that end another one come after it.
+const IN_PYTHON: [(&str, &str); 20] = [
+    ("MipDepths::Farthest", "depths=\"farthest\""),
+    ("Depths::Farthest", "depths=\"farthest\""),
+    ("Depths::Nearest", "depths=\"nearest\""),
+    ("Depths::Both", "depths=\"both\""),
+    ("Depths::Receivers", "depths=\"receivers\""),
+    ("Emit::Binned", "emit=\"bins\""),
+    ("Emit::Instances", "emit=\"instances\""),
+    ("Order::Stable", "\"stable\""),
+    ("Order::Any", "\"any\""),
+    ("Coverage::Area", "\"area\""),
+    ("Coverage::Sample", "\"sample\""),
+    ("Fit::Rectangle", "\"rectangle\""),
+    ("Fit::Volume", "\"volume\""),
+    ("Placement::Packed", "placement=\"packed\""),
+    ("Placement::Reserved", "placement=\"reserved\""),
+    ("`record_cull`", "`Device.cull`"),
+    ("`record_early`", "`Temporal.early`"),
+    ("`record_late`", "`Temporal.late`"),
+    ("expected Stable", "expected \"stable\""),
+    ("got Any", "got \"any\""),
+];
+
+/// A message of the engine in the words of Python.
+fn in_python(text: String) -> String {
+    IN_PYTHON.iter().fold(text, |text, (name, word)| text.replace(name, word))
 }

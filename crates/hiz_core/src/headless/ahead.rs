@@ -8,7 +8,9 @@ use crate::error::Result;
 use crate::gpu::buffers::STORAGE;
 use crate::gpu::copies::{BufferRange, Copies};
 use crate::headless::engine::Engine;
-use crate::headless::ranges::{count_ranges, mask_ranges, pixel_ranges, verdict_ranges};
+use crate::headless::ranges::{
+    bin_ranges, count_ranges, mask_ranges, pixel_ranges, verdict_ranges,
+};
 use crate::instances::Instances;
 use crate::output::counters::CounterRecord;
 use crate::output::visible::Visible;
@@ -59,6 +61,7 @@ impl Ahead {
                 filled.map(|list| BufferRange::first(list.bound(), 4 * u64::from(list.capacity))),
             );
         }
+        ranges.extend(bin_ranges(instances, visible));
         ranges.extend(pixel_ranges(instances, visible));
         let copies = Copies::record(gpu, encoder, engine.staging(), &ranges)?;
         Ok(Self { copies, counters, slot: Arc::new(()) })

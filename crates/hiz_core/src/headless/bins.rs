@@ -14,8 +14,13 @@ pub const NO_LOD: u8 = u8::MAX;
 impl Culling {
     /// The bins of the cull.
     pub(super) fn bins(&self) -> Result<&Bins> {
+        let is_missing = self.visible.bins.is_none() && !self.visible.outputs().emit.is_one_list();
+        self.require("draws or indices", !is_missing)?;
         self.visible.bins.as_ref().ok_or_else(|| {
-            Error::mismatch("outputs", "expected a cull with Emit::Binned or Emit::Instances")
+            Error::mismatch(
+                "outputs",
+                "expected a cull with meshes, by Emit::Binned or Emit::Instances",
+            )
         })
     }
 
@@ -116,25 +121,71 @@ impl Culling {
         };
         let records = self.read(&ranges)?;
         let mut lists = memory::list(bins.pieces.len(), "bin")?;
-        for (p, (piece, words)) in bins.pieces.iter().zip(&records).enumerate() {
-            let list = piece.list.as_ref().ok_or_else(|| {
-                Error::mismatch("outputs", "expected a cull that was asked for indices")
-            })?;
+        for (p, words) in records.iter().enumerate() {
             let words: Vec<u32> = to_u32(words).collect();
             let (begin, count) = match bins.reserved(p, mesh, lod) {
                 Some((begin, _)) => (begin, if words.len() > 1 { words[1] } else { words[0] }),
                 None => (words[0], words[1]),
             };
-            lists.push(BufferRange {
-                buffer: list,
-                offset: 4 * u64::from(begin),
-                size: 4 * u64::from(count),
-            });
+            lists.push(part_of_list(bins, p, begin, count)?);
         }
         let parts = self.read(&lists)?;
         let mut indices = memory::list(parts.iter().map(|bytes| bytes.len() / 4).sum(), "bin")?;
         indices.extend(parts.iter().flat_map(|bytes| to_u32(bytes)));
         Ok(indices)
+    }
+
+    /// What the lists of all bins hold, ascending.
+    /// A capacity cuts the coarsest LODs, so the mask does not tell it.
+    pub(super) fn indices_of_bins(&self, bins: &Bins) -> Result<Vec<u32>> {
+        let lists = match bins.arrangement {
+            Arrangement::Reserved => self.reserved_lists(bins)?,
+            Arrangement::Packed | Arrangement::Instances => {
+                let totals = self.read(&[BufferRange::first(&bins.totals, bins.totals.size())])?;
+                let totals: Vec<TotalRecord> = bytemuck::pod_collect_to_vec(&totals[0]);
+                let written = totals.iter().enumerate().map(|(p, total)| (p, 0, total.written));
+                written
+                    .map(|(p, begin, count)| part_of_list(bins, p, begin, count))
+                    .collect::<Result<_>>()?
+            }
+        };
+        let parts = self.read(&lists)?;
+        let mut is_listed = memory::list(self.instances.len() as usize, "indices")?;
+        is_listed.resize(self.instances.len() as usize, false);
+        for index in parts.iter().flat_map(|bytes| to_u32(bytes)) {
+            is_listed[index as usize] = true;
+        }
+        let count = parts.iter().map(|bytes| bytes.len() / 4).sum();
+        let mut indices = memory::list(count, "indices")?;
+        indices.extend((0..).zip(&is_listed).filter_map(|(i, listed)| listed.then_some(i)));
+        Ok(indices)
+    }
+
+    /// The lists of bins that have places of their own, without those of empty bins.
+    fn reserved_lists<'a>(&self, bins: &'a Bins) -> Result<Vec<BufferRange<'a>>> {
+        let counts: Vec<Vec<u32>> = if self.options.order == Order::Any {
+            let words: Vec<u32> = to_u32(&self.draw_bytes(bins)?).collect();
+            let record = (bins.record_bytes() / 4) as usize;
+            let pieces = words.chunks_exact(bins.records as usize * record);
+            pieces.map(|piece| piece.chunks_exact(record).map(|draw| draw[1]).collect()).collect()
+        } else {
+            let whole = |buffer: &'a wgpu::Buffer| BufferRange::first(buffer, buffer.size());
+            let records: Vec<_> = bins.pieces.iter().map(|piece| whole(&piece.bins)).collect();
+            let bytes = self.read(&records)?;
+            let records = bytes.iter().map(|b| bytemuck::pod_collect_to_vec::<u8, BinRecord>(b));
+            records.map(|of_piece| of_piece.iter().map(|bin| bin.count).collect()).collect()
+        };
+        let mut lists = Vec::new();
+        for (p, counts) in counts.iter().enumerate() {
+            let lods = bins.meshes.most_lods();
+            for (number, count) in (0..).zip(counts).filter(|(_, count)| **count > 0) {
+                let place = bins.reserved(p, number / lods, number % lods);
+                if let Some((begin, _)) = place {
+                    lists.push(part_of_list(bins, p, begin, *count)?);
+                }
+            }
+        }
+        Ok(lists)
     }
 
     /// The level of detail of each instance, by its index, and [`NO_LOD`] for those that were not
@@ -195,4 +246,13 @@ impl Culling {
         let sum = |of: fn(&TotalRecord) -> u32| totals.iter().map(|t| u64::from(of(t))).sum();
         Ok((Some(sum(|t| t.demand)), sum(|t| t.written)))
     }
+}
+
+/// So many words of a piece's list, from word `begin` on.
+fn part_of_list(bins: &Bins, piece: usize, begin: u32, count: u32) -> Result<BufferRange<'_>> {
+    let buffer = bins.pieces[piece]
+        .list
+        .as_ref()
+        .ok_or_else(|| Error::mismatch("outputs", "expected a cull that was asked for indices"))?;
+    Ok(BufferRange { buffer, offset: 4 * u64::from(begin), size: 4 * u64::from(count) })
 }

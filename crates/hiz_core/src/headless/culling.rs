@@ -243,14 +243,15 @@ impl Culling {
 
     /// The draw arguments, [`max_draws`](crate::Visible::max_draws) records per piece.
     /// If the cull did not write them, they are made from its mask: one record per piece.
+    /// A mask does not tell bins, so their draws have to be asked for.
     ///
     /// # Errors
-    /// - [`Error::Mismatch`] for a cull without draws, indices and mask, and for bins of meshes
-    ///   without an index buffer.
+    /// - [`Error::Mismatch`] for a cull without draws, indices and mask, for one with meshes and
+    ///   without draws and indices, and for bins of meshes without an index buffer.
     /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
-        if let Some(bins) = &self.visible.bins {
-            return self.indexed_draws(bins);
+        if !self.visible.outputs().emit.is_one_list() {
+            return self.indexed_draws(self.bins()?);
         }
         let draws = match &self.visible.lists {
             Some(lists) => &lists.draws,
@@ -262,11 +263,17 @@ impl Culling {
 
     /// The packed list of the kept instances' indices, all pieces joined.
     /// If the cull did not write it, it is made from its mask, ascending.
+    /// Of bins it has what they list, ascending; [`Culling::bin`] has the list of one.
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for a cull without indices and mask.
     /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn indices(&self) -> Result<Vec<u32>> {
+        if let Some(bins) = self.visible.bins.as_ref().filter(|_| self.visible.outputs().indices) {
+            return self.indices_of_bins(bins);
+        }
+        // Of a list that was not asked for, the mask does not tell what a capacity cuts.
+        self.require("indices", self.visible.bins.is_none() || !self.visible.is_capped())?;
         let lists = match &self.visible.lists {
             Some(lists) if self.visible.outputs().indices && lists.copied.is_none() => lists,
             _ => self.later_lists("indices")?,

@@ -6,6 +6,7 @@ use crate::gpu::copies::BufferRange;
 use crate::headless::answers::mask_bytes;
 use crate::instances::Instances;
 use crate::instances::piece::Piece;
+use crate::output::bins::Arrangement;
 use crate::output::pixels::PixelCounts;
 use crate::output::survivors::GroupOutput;
 use crate::output::visible::{PieceOutput, Visible, verdicts_offset};
@@ -68,6 +69,22 @@ pub(super) fn mask_ranges<'a>(instances: &Instances, visible: &'a Visible) -> Ve
         .zip(sizes)
         .map(|(output, size)| BufferRange::first(&output.mask, size))
         .collect()
+}
+
+/// All that can be read of bins.
+pub(super) fn bin_ranges<'a>(
+    instances: &'a Instances,
+    visible: &'a Visible,
+) -> Vec<BufferRange<'a>> {
+    let Some(bins) = &visible.bins else { return Vec::new() };
+    let mut buffers = vec![&bins.draws, &bins.draw_counts, &bins.totals];
+    for (piece, output) in instances.pieces.iter().zip(&bins.pieces) {
+        buffers.extend([&output.bins, &output.planes]);
+        buffers.extend(&output.list);
+        let by_slot = bins.arrangement != Arrangement::Instances;
+        buffers.extend(piece.slots.as_ref().filter(|_| by_slot).map(|slots| &slots.index_of));
+    }
+    buffers.into_iter().map(|buffer| BufferRange::first(buffer, buffer.size())).collect()
 }
 
 /// The counts of pixels of all pieces; none if they were not asked for.

@@ -1,8 +1,8 @@
 //! What an engine tells of bins, and records that are copied in place of indices.
 
-use hiz_core::headless::NO_LOD;
+use hiz_core::headless::{Culling, NO_LOD};
 use hiz_core::testing::CANARY_WORDS;
-use hiz_core::{ABSENT, CullOptions, Emit, Order, Outputs, wgpu};
+use hiz_core::{ABSENT, CullOptions, Emit, Order, Outputs, Placement, wgpu};
 
 use crate::common::Random;
 use crate::expected::{emits, record};
@@ -63,6 +63,116 @@ fn an_engines_cull_tells_its_bins() {
         let outputs = Outputs { indices: true, capacity: Some(9), emit, ..Outputs::NONE };
         let culling = engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
         assert_eq!(culling.demand_and_written().unwrap(), (Some(kept), 9));
+    }
+}
+
+/// The indices of a cull are those that its bins list, whatever cuts them and else was asked for.
+#[test]
+fn indices_are_those_of_the_bins() {
+    let world = World::new(&[]);
+    let mut random = Random(8);
+    for (lods, piece) in [(&[2, 1, 3][..], Some(1024)), (&[4], None)] {
+        let made = Crowd::random(2500, lods, 0.5, 0.2, &mut random);
+        let crowd = Crowd::new(&world, made, piece, true);
+        let World { engine, camera, pyramid, .. } = &world;
+        for emit in emits(&world.table(lods, true)) {
+            let reserved = matches!(emit, Emit::Binned { placement: Placement::Reserved, .. });
+            let orders = [Order::Stable, Order::Any];
+            let orders = &orders[..if reserved && lods.len() == 1 { 2 } else { 1 }];
+            for (order, mask, capacity) in orders.iter().flat_map(|order| {
+                let capacities = [None, Some(0), Some(90), Some(5000)];
+                let both = |capacity| [(*order, true, capacity), (*order, false, capacity)];
+                capacities.into_iter().flat_map(both)
+            }) {
+                let emit = emit.clone();
+                let outputs = Outputs { mask, indices: true, capacity, emit, ..Outputs::NONE };
+                let options = CullOptions { order, ..CullOptions::default() };
+                let culling =
+                    engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
+                let what = format!("{order:?}, mask {mask}, {capacity:?}, {outputs:?}");
+                let got = culling.indices().unwrap();
+                assert!(got.is_sorted(), "{what}");
+                assert_eq!(got.len() as u64, culling.demand_and_written().unwrap().1, "{what}");
+                let Emit::Binned { .. } = outputs.emit else { continue };
+                let mut listed = Vec::new();
+                for (mesh, lods) in (0..).zip(lods) {
+                    for lod in 0..*lods as u32 {
+                        listed.extend(culling.bin(mesh, lod).unwrap());
+                    }
+                }
+                listed.sort_unstable();
+                assert!(got == listed, "{what}");
+            }
+        }
+    }
+}
+
+/// A mask tells neither bins nor what a capacity cuts of them.
+#[test]
+fn what_a_mask_does_not_tell_of_bins_is_refused() {
+    let world = World::new(&[]);
+    let lods = [2, 3];
+    let made = Crowd::random(200, &lods, 0.5, 0.1, &mut Random(10));
+    let crowd = Crowd::new(&world, made, None, true);
+    let World { engine, camera, pyramid, .. } = &world;
+    let options = CullOptions::default();
+    let expected = "expected a cull that was asked for ";
+    for emit in emits(&world.table(&lods, true)) {
+        let cull = |outputs: Outputs| {
+            engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap()
+        };
+        let alone = cull(Outputs { mask: true, emit: emit.clone(), ..Outputs::NONE });
+        for error in [
+            alone.draws().unwrap_err(),
+            alone.draw_counts().unwrap_err(),
+            alone.lods().unwrap_err(),
+            alone.bin(0, 0).unwrap_err(),
+        ] {
+            assert!(
+                error
+                    .to_string()
+                    .contains(&format!("{expected}draws or indices, got one with mask"))
+            );
+        }
+        let kept = crowd.made.iter().filter(|made| made.is_kept()).count();
+        assert_eq!(alone.indices().unwrap().len(), kept);
+        let drawn = Outputs { mask: true, draws: true, capacity: Some(9), emit, ..Outputs::NONE };
+        let error = cull(drawn.clone()).indices().unwrap_err().to_string();
+        assert!(error.contains(&format!("{expected}indices, got one with mask, draws")), "{error}");
+        assert_eq!(cull(Outputs { capacity: None, ..drawn }).indices().unwrap().len(), kept);
+    }
+}
+
+/// What the cull's own submission copies holds bins, too, so no read of them waits.
+#[test]
+fn bins_arrive_with_the_cull() {
+    let world = World::new(&[]);
+    let mut random = Random(9);
+    let lods = [2, 1, 3];
+    let made = Crowd::random(2500, &lods, 0.5, 0.2, &mut random);
+    let crowd = Crowd::new(&world, made, Some(1024), true);
+    let World { engine, camera, pyramid, .. } = &world;
+    for emit in emits(&world.table(&lods, true)) {
+        let outputs = Outputs { capacity: Some(1000), emit, ..Outputs::ALL };
+        let options = CullOptions::default();
+        let later = engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
+        let ahead =
+            engine.cull_ahead(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
+        ahead.wait().unwrap();
+        let answers = |culling: &Culling| {
+            let bins = (0..).zip(lods).flat_map(|(mesh, n)| (0..n as u32).map(move |l| (mesh, l)));
+            let bins: Vec<_> = bins.map(|(mesh, lod)| culling.bin(mesh, lod).ok()).collect();
+            let lists = (culling.indices().unwrap(), culling.lods().unwrap(), bins);
+            (culling.draws().unwrap(), culling.draw_counts().unwrap(), lists)
+        };
+        // What lies on the device is spoiled, so only the copies can be right.
+        let visible = ahead.visible();
+        let lists = (0..visible.num_pieces()).map(|piece| visible.list(piece).unwrap());
+        for buffer in lists.chain(visible.draw_arguments()).chain(visible.draw_count()) {
+            engine.queue().write_buffer(buffer, 0, &vec![0xA5; buffer.size() as usize]);
+        }
+        engine.queue().submit([]);
+        assert!(answers(&ahead) == answers(&later), "{outputs:?}");
     }
 }
 
