@@ -476,3 +476,28 @@ fn updates_that_do_not_fit_are_refused_and_change_nothing() {
     crowd.replace(3, &moved);
     assert_same_as_fresh(&list, &crowd, BoundsKind::Sphere, "after an update");
 }
+
+/// Uploads of more than a megabyte go through buffers that earlier uploads have filled.
+/// The last row of the second one is short, and what lies behind it is zero all the same.
+#[test]
+fn kept_staging_buffers_leave_nothing_of_earlier_uploads() {
+    const ROW: usize = 1024;
+    let upload = |count: usize, order| {
+        let corners = [vec![1.5_f32; 3 * count], vec![2.5_f32; 3 * count]];
+        let [min, max] = corners.each_ref().map(|corners| Floats::F32(corners));
+        let options = InstanceOptions { order, ..InstanceOptions::default() };
+        let made = engine().instances(&Bounds::Boxes { min, max }, &options).unwrap();
+        engine().wait().unwrap();
+        words::pieces(&engine(), &made).unwrap().swap_remove(0)
+    };
+    for order in ORDERS {
+        let whole = upload(30 * ROW, order);
+        assert_eq!((whole.padding.len(), whole.records.len()), (0, 30 * ROW * 12));
+        for count in [29 * ROW + 1, 30 * ROW - 1] {
+            let short = upload(count, order);
+            assert!(short.records[..] == whole.records[..12 * count], "{order:?} {count}");
+            assert_eq!(short.padding.len(), 12 * (30 * ROW - count));
+            assert!(short.padding.iter().all(|word| *word == 0), "{order:?} {count}");
+        }
+    }
+}

@@ -45,6 +45,8 @@ pub struct PieceWords {
     pub indices: Vec<u32>,
     /// The records of the instances, in stored order.
     pub records: Vec<u32>,
+    /// What lies behind them in the last row.
+    pub padding: Vec<u32>,
     /// The records of the groups' boxes.
     pub groups: Vec<u32>,
     /// The records of the boxes of each tier above.
@@ -56,17 +58,23 @@ pub struct PieceWords {
 /// # Errors
 /// [`Error::DeviceLost`](crate::Error::DeviceLost).
 pub fn pieces(engine: &Engine, instances: &Instances) -> Result<Vec<PieceWords>> {
-    let words = |texture: &wgpu::Texture, count: usize| -> Result<Vec<u32>> {
+    let all_words = |texture: &wgpu::Texture| -> Result<Vec<u32>> {
         let row = u64::from(texture.width()) * TEXEL_BYTES;
         let bytes = readback::read_texture(engine.device(), engine.queue(), texture, row)?;
-        Ok(bytemuck::pod_collect_to_vec::<u8, u32>(&bytes)[..count].to_vec())
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    };
+    let words = |texture: &wgpu::Texture, count: usize| -> Result<Vec<u32>> {
+        all_words(texture).map(|words| words[..count].to_vec())
     };
     let of_piece = |p: &Piece| {
         let count = p.count() as usize;
         let record_words = |kind: BoundsKind| kind.record_bytes() as usize / 4;
+        let mut records = all_words(p.records.texture())?;
+        let padding = records.split_off(count * record_words(instances.kind));
         Ok(PieceWords {
             indices: (0..count).map(|i| p.range.start + p.order.index(i) as u32).collect(),
-            records: words(p.records.texture(), count * record_words(instances.kind))?,
+            records,
+            padding,
             groups: words(
                 p.group_records.texture(),
                 p.groups() as usize * record_words(BoundsKind::Box),
