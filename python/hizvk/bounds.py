@@ -32,6 +32,8 @@ _ORDERS = (
     '"wxyz" (nuScenes, COLMAP, Blender, trimesh, MuJoCo) or "xyzw" (SciPy, ROS, glTF, PyBullet, '
     "pycolmap's rotation.quat)"
 )
+#: Bounds that are looked at before all of them are.
+_FEW: Final = 64
 _NO_DEFAULT = "there is no default, for a wrong guess hides things"
 #: What `_arguments.explained` says about keywords of the constructors of `OrientedBoxes`.
 _KEYWORDS: Final = {
@@ -480,7 +482,11 @@ def are_points(bounds: Bounds) -> bool:
             case Spheres():
                 return len(bounds) > 0 and not np.any(bounds.radii)
             case Boxes():
-                return len(bounds) > 0 and bool(np.array_equal(bounds.min, bounds.max))
+                # The first few tell nearly always, and the arrays may be large.
+                return len(bounds) > 0 and all(
+                    np.array_equal(bounds.min[:some], bounds.max[:some])
+                    for some in (_FEW, len(bounds))
+                )
             case Points():
                 return len(bounds) > 0
         return len(bounds) > 0 and not np.any(bounds.half_sizes)

@@ -96,7 +96,7 @@ def culled_views(
 def checked_pyramid(device: Maker, camera: Camera, pyramid: object) -> Pyramid:
     """A pyramid of this device, and of this camera."""
     found = owned("pyramid", pyramid, Pyramid, *A_PYRAMID, device=device)
-    if camera != found.camera:
+    if camera is not found.camera and camera != found.camera:
         raise _other_camera("camera", camera, found)
     return found
 

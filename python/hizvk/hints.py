@@ -84,7 +84,8 @@ class Tally(NamedTuple):
         return cls(counts.tested, counts.outside, counts.occluded, kept, counts.invalid)
 
 
-@dataclass(frozen=True, eq=False)
+# Not frozen: making a frozen one takes several times as long, and each cull makes one.
+@dataclass(eq=False)
 class Question:
     """What a cull was asked, for hints."""
 
