@@ -16,7 +16,7 @@ use crate::occluders::surface::facets::{
     Corner, Facet, REACH, Rounder, Segment, UNITS, Vertex, occludes,
 };
 use crate::occluders::surface::open_pixels::OpenPixels;
-use crate::occluders::surface::planted_fault::Planted;
+use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::projector::Projector;
 use crate::occluders::surface::square::Point;
 use crate::occluders::surface::topology::{Edge, NO_EDGE, Topology};
@@ -541,7 +541,11 @@ impl Look {
                 self.there |= 1 << t;
                 self.facets[t] = facet;
                 let (columns, rows) = around.pixels(size);
-                self.boxes[t] = PixelBox::new(columns, rows);
+                let is_whole = !is_planted!(placed.fault, BoxesTooSmall);
+                let last = |[first, last]: [i32; 2]| {
+                    [first, if is_whole { last } else { first.min(last) }]
+                };
+                self.boxes[t] = PixelBox::new(last(columns), last(rows));
                 extent.join(&around);
             }
         }

@@ -76,7 +76,10 @@ impl<'a> Walk<'a> {
             let has_links = self.links.has_any(look.copy);
             for edge in self.placed.topology.edges(look.meshlet) {
                 if look.is_beyond(edge, near) {
-                    debug_assert!(look.inside(edge).is_some_and(|ends| !visitor.wants(&ends)));
+                    debug_assert!(
+                        is_planted!(self.placed.fault, BoxesTooSmall)
+                            || look.inside(edge).is_some_and(|ends| !visitor.wants(&ends))
+                    );
                     continue;
                 }
                 self.edge((place, look, has_links), edge, &mut around, visitor);
