@@ -37,11 +37,14 @@ pub(crate) fn flushed(v: f32) -> f32 {
 }
 
 /// The least float32 that is not below `v`; infinity past the largest finite one, NaN for NaN.
-#[inline]
+#[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "rounded up in the next line")]
 pub(crate) fn round_up(v: f64) -> f32 {
     let nearest = v as f32;
-    if f64::from(nearest) < v { nearest.next_up() } else { nearest }
+    // `next_up` without its branches, so that loops become vectors: -0 is never below `v`.
+    let bits = nearest.to_bits().cast_signed();
+    let up = f32::from_bits(bits.wrapping_add(bits >> 31 | 1).cast_unsigned());
+    if f64::from(nearest) < v { up } else { nearest }
 }
 
 /// A float64 that is certain not to be below the exact `a + b`.

@@ -69,6 +69,7 @@ fn planted_faults_of_the_proof_let_rays_through() {
         PlantedFault::VerticesInFloat32,
         PlantedFault::LeftOutNeighboursIgnored,
         PlantedFault::CentreForSquare,
+        PlantedFault::BoxesTooSmall,
     ] {
         let of = |way| campaign(way, 1, 600, Some(fault)).iter().map(|t| t.past).sum::<u32>();
         let (usual, any) = (of(Way::Usual), of(Way::AnyCentres));

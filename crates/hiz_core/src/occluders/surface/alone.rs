@@ -30,34 +30,40 @@ pub(super) struct Alone<'a> {
 
 impl Alone<'_> {
     /// Lowers the depths of the pixels that a triangle of `facet` covers as a whole.
-    #[inline]
+    #[inline(always)]
     pub(super) fn cover(&mut self, facet: &Facet, corners: [Corner; 3]) {
         let Self { grid, tiles, fault, .. } = *self;
         let half = if is_planted!(fault, PlaneWithoutReach) { 0.0 } else { Squares::HALF };
         // The fault asks of the centre alone.
         let grown = if is_planted!(fault, CentreForSquare) { None } else { Some(reach(fault)) };
-        for_each_run_inside(corners, grid, grown, |[first, last], y| {
-            let line = ((y - grid.rows[0]) * (grid.columns[1] + 1)).cast_unsigned() as usize;
-            let mut begin = first;
-            while begin <= last {
-                let end = (begin | (TILE.cast_signed() - 1)).min(last);
-                if facet.nearest <= f64::from(tiles.last(begin, y)) {
-                    // All eight, since a loop of fixed length becomes vectors.
-                    let mut all = [0.0; TILE as usize];
-                    for (far, x) in all.iter_mut().zip(begin..) {
-                        *far = facet.range(grid.centre(x), grid.centre(y), half).0;
-                    }
-                    let run = line + begin as usize..=line + end as usize;
-                    let pixels = self.depths[run.clone()].iter_mut().zip(&self.slabs[run]);
-                    for ((depth, slabs), far) in pixels.zip(all) {
-                        let far = Facet::rounded(far, fault);
-                        if far <= slabs.farthest[0] && far < *depth {
-                            *depth = far;
+        for_each_run_inside(
+            corners,
+            grid,
+            grown,
+            #[inline(always)]
+            |[first, last], y| {
+                let line = ((y - grid.rows[0]) * (grid.columns[1] + 1)).cast_unsigned() as usize;
+                let mut begin = first;
+                while begin <= last {
+                    let end = (begin | (TILE.cast_signed() - 1)).min(last);
+                    if facet.nearest <= f64::from(tiles.last(begin, y)) {
+                        // All eight, since a loop of fixed length becomes vectors.
+                        let mut all = [0.0; TILE as usize];
+                        for (far, x) in all.iter_mut().zip(begin..) {
+                            let most = facet.range(grid.centre(x), grid.centre(y), half).0;
+                            *far = Facet::rounded(most, fault);
+                        }
+                        let run = line + begin as usize..=line + end as usize;
+                        let pixels = self.depths[run.clone()].iter_mut().zip(&self.slabs[run]);
+                        for ((depth, slabs), far) in pixels.zip(all) {
+                            if far <= slabs.farthest[0] && far < *depth {
+                                *depth = far;
+                            }
                         }
                     }
+                    begin = end + 1;
                 }
-                begin = end + 1;
-            }
-        });
+            },
+        );
     }
 }

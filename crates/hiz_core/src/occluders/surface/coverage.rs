@@ -25,7 +25,7 @@ impl Grid {
     }
 
     /// The centre of a column or row, in units.
-    #[inline]
+    #[inline(always)]
     pub(super) fn centre(&self, place: i32) -> i32 {
         (place << self.log2) + self.side() / 2
     }
@@ -41,7 +41,7 @@ impl Grid {
     }
 
     /// The squares along one axis whose centres are in an interval of units.
-    #[inline]
+    #[inline(always)]
     fn centres(&self, from: i32, to: i32, within: [i32; 2]) -> [i32; 2] {
         let half = self.side() / 2;
         [((from + half - 1) >> self.log2).max(within[0]), ((to - half) >> self.log2).min(within[1])]
@@ -64,7 +64,7 @@ pub(super) fn pixels(from: i32, to: i32, size: i32) -> [i32; 2] {
 }
 
 /// Twice the area of a triangle; negative if it is counter-clockwise with y up.
-#[inline]
+#[inline(always)]
 pub(super) fn area([a, b, c]: [Corner; 3]) -> i64 {
     i64::from(b.x - a.x) * i64::from(c.y - a.y) - i64::from(b.y - a.y) * i64::from(c.x - a.x)
 }
@@ -83,7 +83,7 @@ pub(super) struct EdgeFunctions {
 impl EdgeFunctions {
     /// By the top-left rule: a point on a side is moved right by an infinitesimal step, and down by
     /// one that is infinitesimal against that, the same for all triangles.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(corners: [Corner; 3]) -> Self {
         let [p, q, r] = corners;
         let on = if area(corners) < 0 { [p, r, q] } else { corners };
@@ -98,13 +98,20 @@ impl EdgeFunctions {
     }
 
     /// The functions at a point.
-    #[inline]
-    fn at(&self, x: i32, y: i32) -> [i64; 3] {
+    #[inline(always)]
+    pub(super) fn at(&self, x: i32, y: i32) -> [i64; 3] {
         std::array::from_fn(|k| {
             self.right[k] * (i64::from(x) - i64::from(self.on[k].x))
                 + self.down[k] * (i64::from(y) - i64::from(self.on[k].y))
                 - self.bias[k]
         })
+    }
+
+    /// Whether the triangle covers the point that is so many units right of one with these values.
+    #[inline(always)]
+    pub(super) fn covers(&self, values: [i64; 3], units: i64) -> bool {
+        let [a, b, c] = std::array::from_fn(|k| values[k] + units * self.right[k]);
+        (a | b | c) >= 0
     }
 }
 
@@ -234,7 +241,7 @@ pub(super) fn for_each_centre(
 /// A square is covered if no side of the triangle meets it as in [`for_each_met`], and the triangle
 /// covers its centre.
 /// Without a `reach` the centre is all that counts.
-#[inline]
+#[inline(always)]
 pub(super) fn for_each_run_inside(
     corners: [Corner; 3],
     grid: Grid,

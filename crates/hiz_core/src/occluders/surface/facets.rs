@@ -81,7 +81,7 @@ impl Rounder {
         Self { projector }
     }
 
-    #[inline]
+    #[inline(always)]
     fn corner(&self, point: &Point) -> Option<Corner> {
         let is_certain =
             point.margin <= LARGEST_ERROR && point.x.abs() < OUTERMOST && point.y.abs() < OUTERMOST;
@@ -91,7 +91,7 @@ impl Rounder {
     }
 
     /// The vertex at a world position, and where it is before it is rounded.
-    #[inline]
+    #[inline(always)]
     pub(super) fn vertex(&self, p: Vec3) -> (Vertex, Point) {
         let clip = self.projector.clip(p);
         let nowhere = Point { x: 0.0, y: 0.0, far: 0.0, margin: f64::INFINITY, far_error: 0.0 };
@@ -108,9 +108,11 @@ impl Rounder {
 
     /// What is left of the edge from a to b, for ends of which at least one is not inside.
     ///
+    /// An end is what [`Rounder::vertex`] makes of it, and its world position.
+    ///
     /// All triangles of the edge get the same two points.
-    pub(super) fn segment(&self, a: Vec3, b: Vec3) -> Segment {
-        if is_before(b, a) {
+    pub(super) fn segment(&self, a: (Vertex, Vec3), b: (Vertex, Vec3)) -> Segment {
+        if is_before(b.1, a.1) {
             return match self.segment_in_order(b, a) {
                 Segment::Between(p, q) => Segment::Between(q, p),
                 other => other,
@@ -120,8 +122,8 @@ impl Rounder {
     }
 
     /// Cuts at the near plane and at the guard band (Liang and Barsky 1984).
-    fn segment_in_order(&self, a: Vec3, b: Vec3) -> Segment {
-        let clips = [self.projector.clip(a), self.projector.clip(b)];
+    fn segment_in_order(&self, a: (Vertex, Vec3), b: (Vertex, Vec3)) -> Segment {
+        let clips = [self.projector.clip(a.1), self.projector.clip(b.1)];
         let [half_width, half_height] = self.projector.half;
         let guard = [GUARD / half_width, GUARD / half_height];
         let inside = |c: &Clip| {
@@ -134,7 +136,7 @@ impl Rounder {
                 guard[1] * w + y,
             ]
         };
-        let ends = [a, b].map(|p| self.vertex(p).0);
+        let ends = [a.0, b.0];
         let is_inside = ends.map(|end| matches!(end, Vertex::Inside(_)));
         let (mut first, mut last) = (0.0_f64, 1.0_f64);
         for (at_a, at_b) in inside(&clips[0]).into_iter().zip(inside(&clips[1])) {

@@ -1,6 +1,7 @@
 //! The conservative depths of an image: thresholds, proof, search.
 
 use crate::host::threads::{cores, on_threads};
+use crate::host::vectors::widest;
 use crate::input::camera::Camera;
 use crate::occluders::surface::cells::Cells;
 use crate::occluders::surface::facets::{Facet, Rounder};
@@ -87,8 +88,14 @@ pub(super) fn image(
     let has_uncertain = looks.has_uncertain;
     let walk = Walk { placed, rounder, looks: &looks, links };
     let mut far = proved(&walk, &mut slabs, &tried, size);
-    let is_open = |(far, slabs): (&f32, &Slabs)| *far == f32::INFINITY && *slabs != Slabs::NONE;
-    let open = OpenPixels::new(size, far.iter().zip(&slabs).map(is_open).collect());
+    let is_open = widest(
+        #[inline(always)]
+        || {
+            let is_open = |(far, slabs): (&f32, &Slabs)| (*far == f32::INFINITY) & slabs.is_any();
+            far.iter().zip(&slabs).map(is_open).collect()
+        },
+    );
+    let open = OpenPixels::new(size, is_open);
     if !open.is_empty() {
         let pixels = open.of_rows([0, size.height.cast_signed() - 1]);
         let bound = |pixel: &u32| centres.bounds(*pixel, &slabs[*pixel as usize]);

@@ -4,9 +4,10 @@
 //! That needs no proof: a triangle that is left out makes its neighbours' edges borders.
 
 use crate::host::linear::{Vec3, dot};
-use crate::host::threads::{cores, on_threads};
+use crate::host::threads::{on_threads, worth_it};
+use crate::host::vectors::widest;
 use crate::input::camera::Camera;
-use crate::input::image::ImageSize;
+use crate::input::image::{ImageSize, MAX_IMAGE_SIDE};
 use crate::input::mesh::FaceCull;
 use crate::occluders::placement::{Placement, box_corner};
 use crate::occluders::shapes::Shapes;
@@ -15,10 +16,10 @@ use crate::occluders::surface::facets::{
     Corner, Facet, REACH, Rounder, Segment, UNITS, Vertex, occludes,
 };
 use crate::occluders::surface::open_pixels::OpenPixels;
-use crate::occluders::surface::planted_fault::Planted;
+use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::projector::Projector;
 use crate::occluders::surface::square::Point;
-use crate::occluders::surface::topology::{NO_EDGE, Topology};
+use crate::occluders::surface::topology::{Edge, NO_EDGE, Topology};
 
 /// The side in pixels of the tiles by which what is hidden is found.
 pub(super) const TILE: u32 = 8;
@@ -26,6 +27,8 @@ pub(super) const TILE: u32 = 8;
 const NO_LOOK: u32 = u32::MAX;
 /// How many meshlets a thread takes at once.
 const PART: usize = 8;
+/// Nanoseconds that looking at a meshlet takes.
+const PER_MESHLET: u64 = 8_000;
 
 /// By tile: the farthest depth that any of its pixels tries.
 #[derive(Debug)]
@@ -113,6 +116,41 @@ pub(super) struct Wanted<'a> {
     pub(super) rows: [i32; 2],
 }
 
+/// The first and the last column and row of pixels that something may meet.
+///
+/// The first is after the last if there are none.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PixelBox {
+    columns: [u16; 2],
+    rows: [u16; 2],
+}
+
+const _: () = assert!(MAX_IMAGE_SIDE <= 1 << u16::BITS);
+
+impl PixelBox {
+    const NOTHING: Self = Self { columns: [1, 0], rows: [1, 0] };
+
+    /// From columns and rows within an image.
+    #[inline]
+    fn new(columns: [i32; 2], rows: [i32; 2]) -> Self {
+        if columns[0] > columns[1] || rows[0] > rows[1] {
+            return Self::NOTHING;
+        }
+        let [columns, rows] = [columns, rows].map(|range| range.map(|place| place as u16));
+        Self { columns, rows }
+    }
+
+    #[inline(always)]
+    pub(super) fn columns(&self) -> [i32; 2] {
+        self.columns.map(i32::from)
+    }
+
+    #[inline(always)]
+    pub(super) fn rows(&self) -> [i32; 2] {
+        self.rows.map(i32::from)
+    }
+}
+
 /// A triangle that was cut, in the rounded image.
 #[derive(Debug, Clone)]
 pub(super) struct Polygon {
@@ -157,6 +195,8 @@ pub(super) struct Look {
     pub(super) vertices: Vec<Vertex>,
     /// By triangle of the meshlet.
     pub(super) facets: Vec<Facet>,
+    /// By triangle of the meshlet: the pixels that its facet and its edges may meet.
+    boxes: Vec<PixelBox>,
     /// Bit k: facet k is there.
     there: u128,
     pub(super) polygons: Vec<Polygon>,
@@ -251,8 +291,9 @@ impl Looks {
                 }
             }
         }
+        let count = is_asked.iter().filter(|is_asked| **is_asked).count() as u64;
         on_threads(
-            cores(),
+            worth_it(PER_MESHLET * count),
             self.all.chunks_mut(PART).zip(is_asked.chunks(PART)),
             |(part, asked)| {
                 for (look, _) in part.iter_mut().zip(asked).filter(|(_, is_asked)| **is_asked) {
@@ -277,12 +318,6 @@ impl Looks {
         self.first_facet[look as usize] + u32::from(triangle)
     }
 
-    /// The look and the triangle of the facet with a number.
-    pub(super) fn of_number(&self, number: u32) -> (&Look, u8) {
-        let look = self.first_facet.partition_point(|first| *first <= number) - 1;
-        (&self.all[look], (number - self.first_facet[look]) as u8)
-    }
-
     /// How many numbers there are.
     pub(super) fn num_facets(&self) -> usize {
         self.first_facet[self.all.len()] as usize
@@ -291,7 +326,7 @@ impl Looks {
 
 impl Look {
     fn new(copy: u32, meshlet: u32) -> Self {
-        let (vertices, facets, polygons) = (Vec::new(), Vec::new(), Vec::new());
+        let (vertices, facets, boxes, polygons) = Default::default();
         Self {
             copy,
             meshlet,
@@ -299,6 +334,7 @@ impl Look {
             rows: [0, -1],
             vertices,
             facets,
+            boxes,
             polygons,
             there: 0,
         }
@@ -330,19 +366,32 @@ impl Look {
         wanted.open.any(columns, rows) && !wanted.tiles.hide(nearest, columns, rows)
     }
 
-    /// Calls `each` for the triangles of the facets in the image.
+    /// Which facets that are there have pixels that are `wanted`: bit k for facet k.
+    #[inline(always)]
+    pub(super) fn within(&self, wanted: impl Fn(&PixelBox) -> bool) -> u128 {
+        let (mut left, mut found) = (self.there, 0);
+        while left != 0 {
+            let triangle = left.trailing_zeros();
+            left &= left - 1;
+            found |= u128::from(wanted(&self.boxes[triangle as usize])) << triangle;
+        }
+        found
+    }
+
+    /// Calls `each` for the triangles of some facets that are there: bit k for facet k.
     ///
     /// A facet is told by its triangle in the meshlet.
-    #[inline]
+    #[inline(always)]
     pub(super) fn for_each_triangle(
         &self,
         placed: &Placed<'_>,
+        facets: u128,
         mut each: impl FnMut(u8, &Facet, [Corner; 3]),
     ) {
         let triangles = &placed.shapes.meshlets[self.meshlet as usize].triangles;
         let is_mirrored = placed.placements[self.copy as usize].mirrored;
         let corners = placed.topology.corners(triangles);
-        let mut left = self.there;
+        let mut left = facets;
         while left != 0 {
             let triangle = left.trailing_zeros() as u8;
             left &= left - 1;
@@ -356,7 +405,7 @@ impl Look {
         }
         for polygon in &self.polygons {
             let facet = &self.facets[usize::from(polygon.triangle)];
-            if facet.is_there() {
+            if facets >> (polygon.triangle & 127) & 1 != 0 {
                 polygon.fan().for_each(|corners| each(polygon.triangle, facet, corners));
             }
         }
@@ -381,7 +430,7 @@ impl Look {
     }
 
     /// The corners of a triangle, none of which is cut off.
-    #[inline]
+    #[inline(always)]
     fn corners(&self, corners: [u8; 3], is_mirrored: bool) -> Option<[Corner; 3]> {
         match corners.map(|v| &self.vertices[usize::from(v)]) {
             [Vertex::Inside(a), Vertex::Inside(b), Vertex::Inside(c)] => {
@@ -395,6 +444,25 @@ impl Look {
     #[inline]
     pub(super) fn has(&self, triangle: u8) -> bool {
         self.there >> (triangle & 127) & 1 != 0
+    }
+
+    /// Whether an edge is of a facet that is there, whole, and not one of `near`.
+    ///
+    /// Both ends are corners of that facet, so the edge meets no pixel that the facet's box has
+    /// not.
+    #[inline(always)]
+    pub(super) fn is_beyond(&self, edge: &Edge, near: u128) -> bool {
+        let is_near = near >> (edge.triangle & 127) & 1 != 0;
+        self.has(edge.triangle) && !is_near && !self.facets[usize::from(edge.triangle)].is_cut
+    }
+
+    /// The ends of an edge, if none is cut off.
+    #[inline(always)]
+    pub(super) fn inside(&self, edge: &Edge) -> Option<[Corner; 2]> {
+        match edge.ends.map(|v| &self.vertices[usize::from(v)]) {
+            [Vertex::Inside(a), Vertex::Inside(b)] => Some([*a, *b]),
+            _ => None,
+        }
     }
 
     /// Whether it meets any row from the first to the last one.
@@ -418,17 +486,23 @@ impl Look {
         if self.vertices.is_empty() || placed.culled != FaceCull::None {
             self.vertices.clear();
             self.vertices.reserve_exact(vertices.len());
-            for vertex in vertices.iter().map(world) {
-                let (vertex, point) = rounder.vertex(vertex);
-                self.vertices.push(vertex);
-                if placed.culled != FaceCull::None {
-                    points.push(point);
-                }
-            }
+            widest(
+                #[inline(always)]
+                || {
+                    for vertex in vertices {
+                        let (vertex, point) = rounder.vertex(world(vertex));
+                        self.vertices.push(vertex);
+                        if placed.culled != FaceCull::None {
+                            points.push(point);
+                        }
+                    }
+                },
+            );
         }
         let triangles = &placed.shapes.meshlets[self.meshlet as usize].triangles;
         let sides = placed.topology.sides(triangles);
         self.facets.resize(sides.len(), Facet::NOTHING);
+        self.boxes.resize(sides.len(), PixelBox::NOTHING);
         let mut extent = Extent::NOTHING;
         for (t, (corners, sides)) in
             placed.topology.corners(triangles).iter().zip(sides).enumerate()
@@ -438,7 +512,7 @@ impl Look {
             }
             let [a, b, c] = *corners;
             let [a, b, c] = if placement.mirrored { [a, c, b] } else { [a, b, c] }.map(usize::from);
-            let mut facet = Facet::NOTHING;
+            let (mut facet, mut around) = (Facet::NOTHING, Extent::NOTHING);
             match [a, b, c].map(|v| self.vertices[v]) {
                 _ if sides[0] == NO_EDGE => {}
                 [Vertex::Inside(p), Vertex::Inside(q), Vertex::Inside(r)] => {
@@ -447,7 +521,7 @@ impl Look {
                             || occludes([a, b, c].map(|v| &points[v]), placed.culled, placed.fault)
                     };
                     if is_met([p, q, r], size, sought) && faces() {
-                        extent.add(&[p, q, r]);
+                        around.add(&[p, q, r]);
                         facet = Facet::new(&[p, q, r], size);
                     }
                 }
@@ -458,7 +532,7 @@ impl Look {
                     {
                         facet = Facet::new(polygon.corners(), size);
                         facet.is_cut = true;
-                        extent.add(polygon.corners());
+                        around.add(polygon.corners());
                         self.polygons.push(polygon);
                     }
                 }
@@ -466,11 +540,17 @@ impl Look {
             if facet.is_there() {
                 self.there |= 1 << t;
                 self.facets[t] = facet;
+                let (columns, rows) = around.pixels(size);
+                let is_whole = !is_planted!(placed.fault, BoxesTooSmall);
+                let last = |[first, last]: [i32; 2]| {
+                    [first, if is_whole { last } else { first.min(last) }]
+                };
+                self.boxes[t] = PixelBox::new(last(columns), last(rows));
+                extent.join(&around);
             }
         }
-        let Extent { x, y } = extent;
-        if x[0] <= x[1] {
-            let (columns, rows) = (pixels(x[0], x[1], size[0]), pixels(y[0], y[1], size[1]));
+        if extent.x[0] <= extent.x[1] {
+            let (columns, rows) = extent.pixels(size);
             self.columns = joined(self.columns, columns);
             self.rows = joined(self.rows, rows);
         }
@@ -505,6 +585,18 @@ impl Extent {
             self.y = [self.y[0].min(corner.y), self.y[1].max(corner.y)];
         }
     }
+
+    #[inline]
+    fn join(&mut self, other: &Self) {
+        self.x = [self.x[0].min(other.x[0]), self.x[1].max(other.x[1])];
+        self.y = [self.y[0].min(other.y[0]), self.y[1].max(other.y[1])];
+    }
+
+    /// The columns and rows of an image of this size that it may meet.
+    #[inline]
+    fn pixels(&self, size: [i32; 2]) -> ([i32; 2], [i32; 2]) {
+        (pixels(self.x[0], self.x[1], size[0]), pixels(self.y[0], self.y[1], size[1]))
+    }
 }
 
 /// Whether a triangle may meet the image where it is not hidden.
@@ -530,10 +622,10 @@ fn cut(
         polygon.count += 1;
     };
     for k in 0..3 {
-        let ((a, from), (b, to)) = (ends[k], ends[(k + 1) % 3]);
+        let (a, b) = (ends[k].0, ends[(k + 1) % 3].0);
         let segment = match (a, b) {
             (Vertex::Inside(p), Vertex::Inside(q)) => Segment::Between(p, q),
-            _ => rounder.segment(from, to),
+            _ => rounder.segment(ends[k], ends[(k + 1) % 3]),
         };
         match segment {
             Segment::Uncertain => return None,

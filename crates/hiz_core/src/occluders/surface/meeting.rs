@@ -2,6 +2,7 @@
 
 use crate::occluders::surface::coverage::Sides;
 use crate::occluders::surface::facets::{Corner, Facet, reach};
+use crate::occluders::surface::looks::PixelBox;
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::squares::Squares;
@@ -147,13 +148,14 @@ impl<'a> Meeting<'a> {
         if !met.is_there() {
             return NO_PIECE;
         }
-        let known = self.by_number[met.number as usize];
+        let number = self.walk.looks.number(met.look, met.triangle) as usize;
+        let known = self.by_number[number];
         if known != NO_PIECE {
             return known;
         }
         let own = self.pieces.len() as u32;
-        self.by_number[met.number as usize] = own;
-        let (look, triangle) = self.walk.looks.of_number(met.number);
+        self.by_number[number] = own;
+        let (look, triangle) = (&self.walk.looks.all[met.look as usize], met.triangle);
         let (mut first, before) = (None, self.more.len());
         look.for_each_part(&self.walk.placed, triangle, |corners| {
             let corners = corners.map(|c| [c.x, c.y]);
@@ -194,6 +196,11 @@ impl<'a> Meeting<'a> {
 }
 
 impl Visitor for Meeting<'_> {
+    #[inline]
+    fn asks(&self, around: &PixelBox) -> bool {
+        self.squares.any_of(around)
+    }
+
     #[inline]
     fn wants(&self, ends: &[Corner; 2]) -> bool {
         self.squares.any(ends)

@@ -117,6 +117,7 @@ use std::sync::{Arc, OnceLock};
 use crate::error::{Error, Result};
 use crate::host::memory;
 use crate::host::threads::{Locked, cores};
+use crate::host::vectors::widest;
 use crate::input::bounds::Floats;
 use crate::input::camera::Camera;
 use crate::input::mesh::{FaceCull, MeshData};
@@ -441,16 +442,23 @@ impl OccluderSurface {
             fault,
         };
         let rounder = Rounder::new(Projector::new(camera, fault));
-        let far = image(placed, &links.standing(&placements), &rounder);
+        let mut far = image(placed, &links.standing(&placements), &rounder);
         let convention = camera.convention();
         // The value of `far` at the far plane; reversed Z counts its depths negative.
         let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
-        let ndc = |far: f32| match (far < beyond, convention.is_reversed()) {
-            (false, _) => convention.far(),
-            (true, false) => far,
-            (true, true) => Some(-far).filter(|d| *d >= LEAST_DEPTH).unwrap_or(0.0),
-        };
-        Ok(far.into_iter().map(ndc).collect())
+        let (farthest, is_reversed) = (convention.far(), convention.is_reversed());
+        widest(
+            #[inline(always)]
+            || {
+                for depth in &mut far {
+                    // Depths below the least one are at the far plane, too.
+                    let ndc = if is_reversed { -*depth } else { *depth };
+                    let is_near = (*depth < beyond) & (!is_reversed | (ndc >= LEAST_DEPTH));
+                    *depth = if is_near { ndc } else { farthest };
+                }
+            },
+        );
+        Ok(far)
     }
 
     /// World positions of the vertices, and triangles as indices into them.

@@ -13,6 +13,7 @@ pub(super) struct PixelBits {
 
 impl PixelBits {
     /// The pixels of rows of so many `pixels`, from a first one on, for which `is_in` holds.
+    #[inline(always)]
     pub(super) fn new<T>(width: u32, first: i32, pixels: &[T], is_in: impl Fn(&T) -> bool) -> Self {
         let (width, words) = (width as usize, width.div_ceil(64) as usize);
         let mut bits = Vec::with_capacity(words * pixels.len() / width);

@@ -67,6 +67,8 @@ pub enum PlantedFault {
     CentreForSquare,
     /// There, edges to triangles that were left out are no borders.
     LeftOutNeighboursIgnored,
+    /// There and in the search, the box of a triangle's pixels has the first of them alone.
+    BoxesTooSmall,
     /// There, the pass over edges decides what is in a slab with planes in float32.
     MembershipInFloat32,
     /// Vertices are rounded to float32, and to the eye, before they are projected.

@@ -72,7 +72,7 @@ impl Projector {
     ///
     /// `d` has one rounding, each product two, and the sums add three: 6 roundings of every term.
     /// The bound takes 8.
-    #[inline]
+    #[inline(always)]
     pub(super) fn clip(&self, p: Vec3) -> Clip {
         let d = sub(p, self.origin);
         #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
@@ -92,7 +92,7 @@ impl Projector {
     }
 
     /// How far a point is behind the clipping plane, times w.
-    #[inline]
+    #[inline(always)]
     pub(super) fn depth_in(&self, c: &Clip) -> f64 {
         c.at[2] - self.clipped * c.at[3]
     }
@@ -102,7 +102,7 @@ impl Projector {
     /// With `v` for x, y or far, the exact quotient differs from `v / w` by `((v' - v) - (v / w)
     /// (w' - w)) / w'`.
     /// The reciprocal of w and the product with it add two roundings; the bound takes four.
-    #[inline]
+    #[inline(always)]
     pub(super) fn point(&self, c: &Clip) -> Option<Point> {
         let ([x, y, far, w], [ex, ey, ef, ew]) = (c.at, c.error);
         let least_w = w - ew;

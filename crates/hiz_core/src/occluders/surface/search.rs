@@ -10,7 +10,7 @@
 //!
 //! Where a nearer sheet covers a part alone, the quarters are asked.
 
-use crate::host::threads::{cores, on_threads};
+use crate::host::threads::{on_threads, worth_it};
 use crate::occluders::surface::coverage::QUARTERS;
 use crate::occluders::surface::facets::{Facet, REACH, UNITS, reach};
 use crate::occluders::surface::meeting::{Meeting, NO_PIECE};
@@ -24,6 +24,10 @@ use crate::occluders::surface::walk::Walk;
 ///
 /// Nothing rests on it.
 const WORTH: f32 = 0.98;
+
+/// Nanoseconds that a search takes for an open pixel, and for a meshlet.
+const PER_PIXEL: u64 = 600;
+const PER_LOOK: u64 = 5_000;
 
 /// Lowers the values of `far` of the open pixels: every ray through the closed square of a pixel is
 /// blocked there or before.
@@ -41,7 +45,8 @@ pub(super) fn search(
 ) {
     let size = open.size();
     let part = (band_rows(size) * size.width) as usize;
-    on_threads(cores(), far.chunks_mut(part).zip(bands(size)), |(far, rows)| {
+    let ns = PER_PIXEL * bounds.len() as u64 + PER_LOOK * walk.looks.all.len() as u64;
+    on_threads(worth_it(ns), far.chunks_mut(part).zip(bands(size)), |(far, rows)| {
         let pixels = open.of_rows(rows);
         if pixels.is_empty() {
             return;
@@ -157,6 +162,8 @@ struct Search<'a> {
     /// By piece: its member, valid where `stamps` has the current stamp.
     places: Vec<u32>,
     stamps: Vec<u32>,
+    /// By piece: the stamp of the last part of a pixel in which an edge of it was met.
+    touched: Vec<u32>,
     stamp: u32,
 }
 
@@ -171,6 +178,7 @@ impl<'a> Search<'a> {
             levels: Vec::new(),
             places: vec![0; count],
             stamps: vec![0; count],
+            touched: vec![0; count],
             stamp: 0,
         }
     }
@@ -244,7 +252,26 @@ impl<'a> Search<'a> {
         let half = f64::from(square.half + REACH);
         let half = if is_planted!(fault, DepthAtCentre) { 0.0 } else { half };
         let half = if is_planted!(fault, PlaneWithoutReach) { 0.0 } else { half };
+        // All that is here meets the pixel itself, but not each part of it.
+        let is_part = square.half != UNITS / 2;
+        if is_part {
+            for number in edges.iter().copied() {
+                let edge = &self.meeting.edges[number as usize];
+                if square.is_met(edge.ends, self.reach) {
+                    met.push(number);
+                    for piece in edge.pieces.into_iter().filter(|piece| *piece != NO_PIECE) {
+                        self.touched[piece as usize] = self.stamp;
+                    }
+                }
+            }
+        } else {
+            met.extend_from_slice(edges);
+        }
         for (piece, windings) in pieces.iter().copied() {
+            let is_touched = self.touched[piece as usize] == self.stamp;
+            if is_part && windings[which] == 0 && !is_touched {
+                continue;
+            }
             let facet = self.meeting.pieces[piece as usize].facet;
             if facet.nearest >= f64::from(bound) {
                 continue;
@@ -262,16 +289,13 @@ impl<'a> Search<'a> {
             self.stamps[piece as usize] = self.stamp;
             members.push(Member { piece, parent, near, own, is_met: winding != 0, covers: false });
         }
-        for number in edges.iter().copied() {
-            let edge = &self.meeting.edges[number as usize];
+        met.retain(|number| {
+            let edge = &self.meeting.edges[*number as usize];
             let known = |piece: u32| piece != NO_PIECE && self.stamps[piece as usize] == self.stamp;
             let is_known = edge.pieces.map(known);
-            // It is known of all edges that they meet the pixel itself.
-            let is_met = || square.half == UNITS / 2 || square.is_met(edge.ends, self.reach);
-            if is_known == [false; 2] || !is_met() {
-                continue;
+            if is_known == [false; 2] {
+                return false;
             }
-            met.push(number);
             let place = |k: usize| self.places[edge.pieces[k] as usize];
             if is_known == [true; 2] {
                 let both = [place(0), place(1)];
@@ -287,7 +311,8 @@ impl<'a> Search<'a> {
                 member.is_met = true;
                 member.own.is_open |= !is_planted!(fault, ContoursIgnored);
             }
-        }
+            true
+        });
     }
 
     /// The farthest of the quarters, if that is nearer than `best`, which holds for all of them.
@@ -364,20 +389,26 @@ impl Level {
     fn nearest(&mut self, covers: impl Fn(&Sums) -> bool) -> f32 {
         let members = &mut self.members;
         self.sheets.clear();
-        self.sheets.resize(members.len(), Sums::NOTHING);
-        for i in 0..members.len() as u32 {
-            let head = head(members, i);
-            let (own, sum) = (members[i as usize].own, &mut self.sheets[head as usize]);
+        for i in 0..members.len() {
+            // Parents come before their children, so the parent's parent is its head.
+            let head = members[members[i].parent as usize].parent;
+            members[i].parent = head;
+            let own = members[i].own;
+            self.sheets.push(own);
+            if head as usize == i {
+                continue;
+            }
+            let sum = &mut self.sheets[head as usize];
             sum.winding += own.winding;
             sum.is_open |= own.is_open;
             sum.is_folded |= own.is_folded;
             sum.far = sum.far.max(own.far);
         }
         let mut least = f32::INFINITY;
-        for i in 0..members.len() as u32 {
-            let sheet = &self.sheets[head(members, i) as usize];
+        for member in members {
+            let sheet = &self.sheets[member.parent as usize];
             if covers(sheet) {
-                members[i as usize].covers = true;
+                member.covers = true;
                 least = least.min(sheet.far);
             }
         }

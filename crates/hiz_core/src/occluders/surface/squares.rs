@@ -1,8 +1,8 @@
 //! The pixels that are asked about: all of some rows, or the open ones among them.
 
-use crate::occluders::surface::coverage::{Grid, Sides, for_each_centre, for_each_met};
+use crate::occluders::surface::coverage::{EdgeFunctions, Grid, for_each_centre, for_each_met};
 use crate::occluders::surface::facets::{Corner, Facet, REACH, UNITS};
-use crate::occluders::surface::looks::Tiles;
+use crate::occluders::surface::looks::{PixelBox, Tiles};
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::pixel_bits::PixelBits;
 
@@ -56,6 +56,17 @@ impl<'a> Squares<'a> {
         Place { centre: [self.grid.centre(x), self.grid.centre(y)], number }
     }
 
+    /// Whether any pixel in a box is asked about.
+    #[inline]
+    pub(super) fn any_of(&self, around: &PixelBox) -> bool {
+        let (rows, within) = (around.rows(), self.grid.rows);
+        let rows = [rows[0].max(within[0]), rows[1].min(within[1])];
+        match self.kind {
+            Kind::Left { left, .. } => left.any(around.columns(), rows),
+            Kind::Open { open, .. } => open.any(around.columns(), rows),
+        }
+    }
+
     /// Whether pixels in a box of units, grown by [`REACH`], are asked about at all.
     #[inline]
     pub(super) fn any(&self, corners: &[Corner]) -> bool {
@@ -92,9 +103,6 @@ impl<'a> Squares<'a> {
     ) {
         match self.kind {
             Kind::Left { left, tiles } => {
-                if !self.any(&corners) {
-                    return;
-                }
                 let is_hidden =
                     |x, y| !left.any_of_eight(x, y) || facet.nearest > f64::from(tiles.last(x, y));
                 for_each_centre(corners, self.grid, is_hidden, |x, y| {
@@ -110,16 +118,15 @@ impl<'a> Squares<'a> {
                     [a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x)],
                     [a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y)],
                 );
-                if !open.any(columns, rows) {
-                    return;
-                }
-                let corners = corners.map(|c| [c.x, c.y]);
+                let functions = EdgeFunctions::new(corners);
                 for y in rows[0]..=rows[1] {
-                    for (number, x) in open.of_row(y, columns) {
+                    let mut of_row = open.of_row(y, columns).peekable();
+                    let Some((_, begin)) = of_row.peek().copied() else { continue };
+                    let row = functions.at(self.grid.centre(begin), self.grid.centre(y));
+                    for (number, x) in of_row {
                         let place = self.place(x, y, number - first);
-                        if is_wanted(place.number)
-                            && Sides::new(&corners, place.centre).winding() != 0
-                        {
+                        let right = i64::from((x - begin) * UNITS);
+                        if functions.covers(row, right) && is_wanted(place.number) {
                             cover(place);
                         }
                     }

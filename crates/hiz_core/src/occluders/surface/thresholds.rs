@@ -11,7 +11,8 @@
 //! 1. down to the plane through the centre, as its neighbours continue it;
 //! 2. the cluster of the centre, with some room.
 
-use crate::host::threads::{cores, on_threads};
+use crate::host::threads::{on_threads, worth_it};
+use crate::host::vectors::widest;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::occluders::surface::looks::{TILE, Tiles};
 
@@ -24,6 +25,8 @@ const STEP: f32 = 0.93;
 const SLOPE: f32 = 0.55;
 /// How far slab 2 goes on beyond its cluster, in steps from the centre to the cluster's end.
 const BEYOND: f32 = 0.3;
+/// Nanoseconds that choosing takes for a pixel.
+const PER_PIXEL: u64 = 4;
 /// A little farther than a depth that float32 rounded.
 const HAIR: f32 = 1.0 - 1e-5;
 /// How much farther than all neighbours a search looks at first, and then.
@@ -45,6 +48,12 @@ impl Slabs {
     /// A pixel at whose centre there is nothing.
     pub(super) const NONE: Self =
         Self { farthest: [f32::NEG_INFINITY; SLABS], nearest: f32::INFINITY };
+
+    /// Whether they are not [`Slabs::NONE`].
+    #[inline(always)]
+    pub(super) fn is_any(&self) -> bool {
+        self.nearest < f32::INFINITY
+    }
 
     /// What comes after this is in no slab.
     #[inline(always)]
@@ -70,10 +79,15 @@ impl Centres<'_> {
         let mut tiles = Tiles::closed(self.size);
         let rows = TILE as usize * width;
         let parts = slabs.chunks_mut(rows).zip(tiles.lines_mut());
-        on_threads(cores(), parts.zip((0..).step_by(TILE as usize)), |((part, tiles), first)| {
+        let threads = worth_it(PER_PIXEL * self.depths.len() as u64);
+        on_threads(threads, parts.zip((0..).step_by(TILE as usize)), |((part, tiles), first)| {
             let mut around = Around::default();
             for (slabs, y) in part.chunks_exact_mut(width).zip(first..) {
-                self.choose(y, slabs, &mut around);
+                widest(
+                    #[inline(always)]
+                    || self.choose(y, slabs, &mut around),
+                );
+                self.divide(slabs, &around);
                 for (slabs, tile) in slabs.chunks(TILE as usize).zip(tiles.iter_mut()) {
                     for last in slabs.iter().map(Slabs::last) {
                         *tile = if last > *tile { last } else { *tile };
@@ -131,30 +145,60 @@ impl Centres<'_> {
         nine
     }
 
-    /// Chooses the slabs of a row of pixels, which have nothing so far.
+    /// Chooses the slabs of a row of pixels, as if each and its neighbours were one cluster.
+    #[inline(always)]
     fn choose(&self, y: usize, slabs: &mut [Slabs], around: &mut Around) {
-        around.fill(self.lines(y).map(|line| line.iter().map(|depth| self.near(*depth))));
-        let farthest = |near: f32| if near > 0.0 { self.far(near) } else { f32::NEG_INFINITY };
-        let Around { lines, least, most, slopes, .. } = &*around;
-        let columns = lines[1][1..].iter().zip(least).zip(most).zip(slopes).enumerate();
-        for (slabs, (x, (((centre, least), most), slopes))) in slabs.iter_mut().zip(columns) {
-            if *centre <= 0.0 {
-                continue;
-            }
-            let cluster = if *least >= STEP * most {
-                Cluster { first: f32::INFINITY, end: *least }
-            } else {
-                Cluster::of(&around.nine(x), *centre, *most)
-            };
-            let room = (cluster.end - BEYOND * (centre - cluster.end)) * HAIR;
-            slabs.farthest = [farthest((centre - SLOPE * slopes) * HAIR), farthest(room)];
-            slabs.nearest = if cluster.first < f32::INFINITY {
-                self.far(NEARER * cluster.first)
-            } else {
-                f32::NEG_INFINITY
+        around.fill(self.lines(y).map(
+            #[inline(always)]
+            |line| {
+                line.iter().map(
+                    #[inline(always)]
+                    |depth| self.near(*depth),
+                )
+            },
+        ));
+        let Around { lines, least, slopes, .. } = &*around;
+        let columns = lines[1][1..].iter().zip(least).zip(slopes);
+        for (slabs, ((centre, least), slopes)) in slabs.iter_mut().zip(columns) {
+            let first = self.farthest((centre - SLOPE * slopes) * HAIR);
+            let farthest = [first, self.farthest(room(*centre, *least))];
+            let is_there = *centre > 0.0;
+            *slabs = Slabs {
+                farthest: farthest.map(
+                    #[inline(always)]
+                    |far| if is_there { far } else { f32::NEG_INFINITY },
+                ),
+                nearest: if is_there { f32::NEG_INFINITY } else { f32::INFINITY },
             };
         }
     }
+
+    /// Gives the pixels of a row whose neighbours are more than one cluster that of their centre.
+    fn divide(&self, slabs: &mut [Slabs], around: &Around) {
+        let columns = around.lines[1][1..].iter().zip(&around.least).zip(&around.most).enumerate();
+        for (slabs, (x, ((centre, least), most))) in slabs.iter_mut().zip(columns) {
+            if *least >= STEP * most || *centre <= 0.0 {
+                continue;
+            }
+            let cluster = Cluster::of(&around.nine(x), *centre, *most);
+            slabs.farthest[1] = self.farthest(room(*centre, cluster.end));
+            if cluster.first < f32::INFINITY {
+                slabs.nearest = self.far(NEARER * cluster.first);
+            }
+        }
+    }
+
+    /// The value of `far` for how near something is; minus infinity beyond the far plane.
+    #[inline(always)]
+    fn farthest(&self, near: f32) -> f32 {
+        if near > 0.0 { self.far(near) } else { f32::NEG_INFINITY }
+    }
+}
+
+/// Some room beyond the end of the cluster of a pixel's centre, with more for nearer.
+#[inline(always)]
+fn room(centre: f32, end: f32) -> f32 {
+    (end - BEYOND * (centre - end)) * HAIR
 }
 
 /// What is around the pixels of a row, with more for nearer.
@@ -175,6 +219,7 @@ struct Around {
 
 impl Around {
     /// Fills all lists, for rows of how near pixels are.
+    #[inline(always)]
     fn fill(&mut self, rows: [impl Iterator<Item = f32>; 3]) {
         for (line, row) in self.lines.iter_mut().zip(rows) {
             line.clear();
@@ -247,6 +292,32 @@ impl Cluster {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn wider_vectors_choose_the_same_slabs() {
+        let mut state = 1_u32;
+        let mut below = |n: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) % n
+        };
+        let size = ImageSize::new(67, 21);
+        for convention in [DepthConvention::Reversed, DepthConvention::Standard] {
+            let mut depth = || [0.0, 1.0, below(1000) as f32 / 1000.0][below(20).min(2) as usize];
+            let depths: Vec<f32> = (0..67 * 21).map(|_| depth()).collect();
+            let centres = Centres { depths: &depths, size, convention };
+            let (found, mut around) = (centres.slabs().0, Around::default());
+            for (y, found) in found.chunks(67).enumerate() {
+                let mut slabs = [Slabs::NONE; 67];
+                centres.choose(y, &mut slabs, &mut around);
+                centres.divide(&mut slabs, &around);
+                assert_eq!(found, slabs, "{y} {convention:?}");
+                for (slabs, depth) in slabs.iter().zip(&depths[y * 67..]) {
+                    assert_eq!(slabs.is_any(), *slabs != Slabs::NONE);
+                    assert_eq!(slabs.is_any(), centres.near(*depth) > 0.0);
+                }
+            }
+        }
+    }
 
     /// By sorting, and looking for gaps.
     fn sorted(mut nine: [f32; 9], centre: f32) -> (f32, f32) {

@@ -5,7 +5,7 @@
 
 use crate::occluders::surface::facets::{Corner, Facet, Rounder, Segment, Vertex};
 use crate::occluders::surface::links::Standing;
-use crate::occluders::surface::looks::{Look, Looks, Placed};
+use crate::occluders::surface::looks::{Look, Looks, PixelBox, Placed};
 use crate::occluders::surface::planted_fault::is_planted;
 use crate::occluders::surface::topology::Edge;
 
@@ -18,16 +18,17 @@ pub(super) struct Walk<'a> {
     pub(super) links: &'a Standing<'a>,
 }
 
-/// A facet, and its number.
+/// A facet, with its look and its triangle in there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Met<'a> {
     pub(super) facet: &'a Facet,
-    pub(super) number: u32,
+    pub(super) look: u32,
+    pub(super) triangle: u8,
 }
 
 impl Met<'_> {
     /// A triangle that is left out.
-    pub(super) const NOTHING: Self = Self { facet: &Facet::NOTHING, number: u32::MAX };
+    pub(super) const NOTHING: Self = Self { facet: &Facet::NOTHING, look: u32::MAX, triangle: 0 };
 
     #[inline]
     pub(super) fn is_there(&self) -> bool {
@@ -37,6 +38,9 @@ impl Met<'_> {
 
 /// What is done with them.
 pub(super) trait Visitor {
+    /// Whether any pixel in a box is asked about.
+    fn asks(&self, around: &PixelBox) -> bool;
+
     /// Whether an edge with these ends is asked for.
     fn wants(&self, ends: &[Corner; 2]) -> bool;
 
@@ -59,9 +63,9 @@ impl<'a> Walk<'a> {
     pub(super) fn visit(&self, wanted: impl Fn(&Look) -> bool, visitor: &mut impl Visitor) {
         let mut around = Vec::new();
         for (place, look) in (0..).zip(&self.looks.all).filter(|(_, look)| wanted(look)) {
-            look.for_each_triangle(&self.placed, |triangle, facet, corners| {
-                let number = self.looks.number(place, triangle);
-                visitor.cover(Met { facet, number }, corners);
+            let near = look.within(|around| visitor.asks(around));
+            look.for_each_triangle(&self.placed, near, |triangle, facet, corners| {
+                visitor.cover(Met { facet, look: place, triangle }, corners);
             });
             for polygon in &look.polygons {
                 let one = self.met(place, look, polygon.triangle);
@@ -71,6 +75,13 @@ impl<'a> Walk<'a> {
             }
             let has_links = self.links.has_any(look.copy);
             for edge in self.placed.topology.edges(look.meshlet) {
+                if look.is_beyond(edge, near) {
+                    debug_assert!(
+                        is_planted!(self.placed.fault, BoxesTooSmall)
+                            || look.inside(edge).is_some_and(|ends| !visitor.wants(&ends))
+                    );
+                    continue;
+                }
                 self.edge((place, look, has_links), edge, &mut around, visitor);
             }
         }
@@ -85,10 +96,7 @@ impl<'a> Walk<'a> {
         around: &mut Vec<(Met<'a>, bool)>,
         visitor: &mut impl Visitor,
     ) {
-        let ends = match edge.ends.map(|v| &look.vertices[usize::from(v)]) {
-            [Vertex::Inside(a), Vertex::Inside(b)] => Some([*a, *b]),
-            _ => None,
-        };
+        let ends = look.inside(edge);
         // Most edges are dropped here, before it is known what meets there.
         if ends.is_some_and(|ends| !visitor.wants(&ends)) {
             return;
@@ -130,7 +138,7 @@ impl<'a> Walk<'a> {
             return Met::NOTHING;
         }
         let facet = &look.facets[usize::from(triangle)];
-        Met { facet, number: self.looks.number(place, triangle) }
+        Met { facet, look: place, triangle }
     }
 
     /// An edge at which more than two triangles may meet.
@@ -175,8 +183,11 @@ impl<'a> Walk<'a> {
             [Vertex::Uncertain, _] | [_, Vertex::Uncertain] => None,
             _ => {
                 let vertices = self.placed.topology.vertices(look.meshlet);
-                let world = |v: u8| self.placed.world(look.copy, vertices[usize::from(v)]);
-                match self.rounder.segment(world(edge.ends[0]), world(edge.ends[1])) {
+                let end = |v: u8| {
+                    let v = usize::from(v);
+                    (look.vertices[v], self.placed.world(look.copy, vertices[v]))
+                };
+                match self.rounder.segment(end(edge.ends[0]), end(edge.ends[1])) {
                     Segment::Between(a, b) => Some([a, b]),
                     Segment::Nothing | Segment::Uncertain => None,
                 }
