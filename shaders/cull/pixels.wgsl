@@ -12,9 +12,15 @@
 // - `pixels_look.wgsl`: `look_at_pixels`
 // - `classify.wgsl`: `pixel_interval`, `between_samples`, `inside_block`
 
-// Invocations of a workgroup, and its instances, which are ordered by the size of their rectangles.
+// Invocations of a workgroup.
 // Twin: `WORKGROUP` in `crates/hiz_core/src/cull/pixels.rs`.
 const WORKGROUP: u32 = 128u;
+// How many instances each of them takes: one after the other, of all that the workgroup orders by
+// the size of their rectangles.
+override PER_INVOCATION: u32;
+// Twin: `MOST_PER_INVOCATION` there.
+const MOST_PER_INVOCATION: u32 = 2u;
+const ORDERED: u32 = WORKGROUP * MOST_PER_INVOCATION;
 
 // A rectangle is large if it has more groups of four pixels of a row.
 const SMALL_ROWS: u32 = 1023u;
@@ -190,13 +196,52 @@ fn count_small(planes: ptr<function, PixelPlanes>, r: vec4<u32>) -> PixelCounts 
 
 // Of each class: how many rectangles there are, and then where they begin.
 var<workgroup> classes: array<atomic<u32>, CLASSES>;
+// Of each instance the class of its rectangle, and its place in that class.
+var<workgroup> keys: array<u32, ORDERED>;
+const CLASS_SHIFT: u32 = 16u;
+const PLACE_MASK: u32 = (1u << CLASS_SHIFT) - 1u;
+// The instance has no small rectangle.
+const NO_KEY: u32 = 0xffffffffu;
 var<workgroup> small_count: u32;
 // The instances with small rectangles, by class.
-var<workgroup> small: array<u32, WORKGROUP>;
+var<workgroup> small: array<u32, ORDERED>;
+
+// Answers an instance, or lists it as a large one, or finds the class of its rectangle.
+fn key_of(i: u32) -> u32 {
+    var projected: Projected;
+    var own = answered(PixelCounts(0u, 0u, 0u, 0u, 0u));
+    if i < piece.count {
+        own = rectangle_of(i, &projected);
+        if !own.is_open {
+            write_counts(i, own.counts);
+        }
+    }
+    let rows = rows_of_four(own.rectangle);
+    var key = NO_KEY;
+    if own.is_open && rows <= SMALL_ROWS {
+        let class_here = size_class(rows);
+        key = (class_here << CLASS_SHIFT) | atomicAdd(&classes[class_here], 1u);
+    } else if own.is_open {
+        atomicStore(&large[1u + atomicAdd(&large[0], 1u)], i);
+    }
+    return key;
+}
+
+// Counts an instance with a small rectangle.
+fn count_alone(i: u32) {
+    var planes: PixelPlanes;
+    // A compiler may fuse what is computed anew in another way, so all of it is from here.
+    let prepared = prepare(i, &planes);
+    var found = prepared.counts;
+    if prepared.is_open {
+        found = count_small(&planes, prepared.rectangle);
+    }
+    write_counts(i, found);
+}
 
 @compute @workgroup_size(WORKGROUP)
 fn count_of_pixels(
-    @builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32,
+    @builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32,
 ) {
     begin();
     // The memory of a workgroup holds anything at first.
@@ -204,23 +249,14 @@ fn count_of_pixels(
         atomicStore(&classes[lane], 0u);
     }
     workgroupBarrier();
-    var projected: Projected;
-    var own = answered(PixelCounts(0u, 0u, 0u, 0u, 0u));
-    if id.x < piece.count {
-        own = rectangle_of(id.x, &projected);
-        if !own.is_open {
-            write_counts(id.x, own.counts);
+    let ordered = WORKGROUP * PER_INVOCATION;
+    var t = lane;
+    loop {
+        keys[t] = key_of(ordered * group.x + t);
+        t += WORKGROUP;
+        continuing {
+            break if t >= ordered;
         }
-    }
-    let rows = rows_of_four(own.rectangle);
-    let is_small = own.is_open && rows <= SMALL_ROWS;
-    var class_here = 0u;
-    var place = 0u;
-    if is_small {
-        class_here = size_class(rows);
-        place = atomicAdd(&classes[class_here], 1u);
-    } else if own.is_open {
-        atomicStore(&large[1u + atomicAdd(&large[0], 1u)], id.x);
     }
     workgroupBarrier();
     if lane == 0u {
@@ -233,19 +269,27 @@ fn count_of_pixels(
         small_count = sum;
     }
     workgroupBarrier();
-    if is_small {
-        small[atomicLoad(&classes[class_here]) + place] = id.x;
+    t = lane;
+    loop {
+        let key = keys[t];
+        if key != NO_KEY {
+            small[atomicLoad(&classes[key >> CLASS_SHIFT]) + (key & PLACE_MASK)] =
+                ordered * group.x + t;
+        }
+        t += WORKGROUP;
+        continuing {
+            break if t >= ordered;
+        }
     }
     workgroupBarrier();
-    if lane < small_count {
-        var planes: PixelPlanes;
-        let i = small[lane];
-        // A compiler may fuse what is computed anew in another way, so all of it is from here.
-        let prepared = prepare(i, &planes);
-        var found = prepared.counts;
-        if prepared.is_open {
-            found = count_small(&planes, prepared.rectangle);
+    t = lane;
+    loop {
+        if t < small_count {
+            count_alone(small[t]);
         }
-        write_counts(i, found);
+        t += WORKGROUP;
+        continuing {
+            break if t >= small_count;
+        }
     }
 }

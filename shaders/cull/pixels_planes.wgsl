@@ -41,7 +41,8 @@ fn proved_offset(r: Value, least: f32, slope: vec2<f32>, most: vec2<f32>, p: Pro
     let holds = is_small(bitcast<u32>(offset)) && error_bound(r, offset, p.w) < LARGEST_ERROR
         && surely_above(r, offset, p.w);
     let magnitudes = abs(offset) + dot(abs(slope), most);
-    return select(NO_PLANE, offset - TEXEL_ULPS * EPS * magnitudes, holds);
+    let margin = TEXEL_ULPS * EPS * magnitudes + TEXEL_FLOOR;
+    return select(NO_PLANE, offset - margin, holds);
 }
 
 // A slope that can be certified, or 0 with `is_steep` where there is none.

@@ -58,12 +58,6 @@ struct Place {
     bottom: f32,
 }
 
-// `clamp`, without the care for NaN that it takes on some devices.
-fn within(x: f32, low: vec4<f32>, high: vec4<f32>) -> vec4<f32> {
-    let raised = select(low, vec4<f32>(x), low < vec4<f32>(x));
-    return select(high, raised, raised < high);
-}
-
 // The place of the pixels from `begin` to before `end`.
 fn place_of(
     planes: ptr<function, PixelPlanes>, begin: vec4<u32>, end: vec4<u32>, rows: vec2<u32>,
@@ -75,15 +69,31 @@ fn place_of(
     let high_y = f32(rows.y) + view.reach - view.half_size.y;
     let left_top = (*planes).left_top;
     let right_bottom = (*planes).right_bottom;
+    // Pixels beyond have nothing of the volume, whatever is said about them.
+    // `max` and `min` take care of NaN, which costs lavapipe two instructions more.
+    let left = vec4<f32>(left_top.x);
+    let right = vec4<f32>(right_bottom.x);
     return Place(
-        within(left_top.x, low, high), within(right_bottom.x, low, high),
-        clamp(left_top.y, low_y, high_y), clamp(right_bottom.y, low_y, high_y));
+        select(low, left, low < left), select(high, right, right < high),
+        select(low_y, left_top.y, low_y < left_top.y),
+        select(high_y, right_bottom.y, right_bottom.y < high_y));
 }
 
-// The least offset - slope . (x, y) over each texel.
-fn least_over(offset: f32, slope: vec2<f32>, at: Place) -> vec4<f32> {
-    let row = offset - slope.y * select(at.top, at.bottom, slope.y > 0.0);
-    return vec4<f32>(row) - slope.x * select(at.left, at.right, slope.x > 0.0);
+// The greatest slope . (x, y) - offset over each texel.
+fn most_over(offset: f32, slope: vec2<f32>, at: Place) -> vec4<f32> {
+    let row = slope.y * select(at.top, at.bottom, slope.y > 0.0) - offset;
+    return vec4<f32>(row) + slope.x * select(at.left, at.right, slope.x > 0.0);
+}
+
+// Comparisons are collected as the signs of differences, each of which is exact.
+// Mesa joins comparisons with one number to a `max`, which is three instructions on lavapipe.
+fn signs_of(difference: vec4<f32>) -> vec4<u32> {
+    return bitcast<vec4<u32>>(difference);
+}
+
+// Whether some of the differences was less than 0.
+fn has_sign(signs: vec4<u32>) -> vec4<bool> {
+    return signs > vec4<u32>(MAGNITUDE_MASK);
 }
 
 // Which texels have a pixel, and which have only pixels, that a plane of the outline excludes.
@@ -94,20 +104,18 @@ struct Outline {
 
 // No texel is wider or higher than `side`.
 fn outline_of(planes: ptr<function, PixelPlanes>, at: Place, side: f32) -> Outline {
-    var outline = Outline(vec4<bool>(false), vec4<bool>(false));
+    var some = vec4<u32>(0u);
+    var all = vec4<u32>(0u);
     for (var i = 0u; i < OUTLINE_PLANES; i += 1u) {
         let slope = (*planes).outline_slopes[i];
-        let least = least_over((*planes).outlines[i], slope, at);
-        let most = least + vec4<f32>(dot(abs(slope), vec2<f32>(side)));
-        outline.some = outline.some | most > vec4<f32>(TEXEL_FLOOR);
-        outline.all = outline.all | least > vec4<f32>(TEXEL_FLOOR);
+        let most = most_over((*planes).outlines[i], slope, at);
+        some |= signs_of(most - vec4<f32>(dot(abs(slope), vec2<f32>(side))));
+        all |= signs_of(most);
     }
-    return outline;
+    return Outline(has_sign(some), has_sign(all));
 }
 
 // What the depths of four texels say; `outside`: a plane of the outline excludes all their pixels.
-//
-// Bounds are compared one by one, which takes less than the greatest of them.
 fn sure_of(
     planes: ptr<function, PixelPlanes>, at: Place, outside: vec4<bool>, raw: vec4<u32>,
     near: vec4<u32>,
@@ -115,17 +123,18 @@ fn sure_of(
     let surface = hiding_bounds(all_sanitized(raw));
     let near_surface = opening_bounds(all_sanitized(near));
     // Whether the volume is farther at least, or nearer at most.
-    var hidden = vec4<f32>((*planes).front) > surface;
-    var before = vec4<f32>((*planes).back) > near_surface;
+    var farther = signs_of(surface - vec4<f32>((*planes).front));
+    var nearer = signs_of(near_surface - vec4<f32>((*planes).back));
     for (var i = 0u; i < FACE_PLANES; i += 1u) {
         let plane = (*planes).faces[i];
         let back = select(plane.xy, -plane.xy, TWO_SIDED);
-        hidden = hidden | least_over(plane.z, plane.xy, at) > surface;
-        before = before | least_over(plane.w, back, at) > near_surface;
+        farther |= signs_of(surface + most_over(plane.z, plane.xy, at));
+        nearer |= signs_of(near_surface + most_over(plane.w, back, at));
     }
+    let hidden = has_sign(farther);
     // Background hides nothing, however far the volume is.
     let is_background = near == vec4<u32>(far_bits());
-    let open = are_depths(near) & (is_background | before);
+    let open = are_depths(near) & (is_background | has_sign(nearer));
     // Nothing of the volume is there if it would have to be behind the surface and in front of it.
     return Sure(outside | (hidden & open), hidden, open);
 }

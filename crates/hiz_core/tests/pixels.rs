@@ -239,6 +239,49 @@ fn groups_change_no_count() {
     }
 }
 
+/// Counts of spheres of many sizes, `at_once` of them per upload.
+fn counts_by_parts(engine: &Engine, at_once: usize) -> Vec<PixelCounts> {
+    let camera = camera_along_z(96, 64, DepthConvention::Reversed);
+    let depth: Vec<f32> = (0..96 * 64)
+        .map(|i| ndc(if i % 96 < 60 { 20.0 } else { 1000.0 }, DepthConvention::Reversed))
+        .collect();
+    let pyramid = engine.pyramid(&engine.upload_depth(&depth, &camera).unwrap()).unwrap();
+    let mut random = common::Random(6);
+    let balls: Vec<([f64; 3], f64)> = (0..600)
+        .map(|_| {
+            let x_y_z =
+                [random.range(-15.0, 15.0), random.range(-10.0, 10.0), random.range(10.0, 60.0)];
+            (x_y_z, random.range(0.1, 5.0))
+        })
+        .collect();
+    let of_part = |part: &[([f64; 3], f64)]| {
+        let centers: Vec<f64> = part.iter().flat_map(|ball| ball.0).collect();
+        let radii: Vec<f64> = part.iter().map(|ball| ball.1).collect();
+        let bounds = Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
+        let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+        let seen =
+            engine.cull(&instances, &camera, &pyramid, &CullOptions::default(), &PIXELS).unwrap();
+        seen.pixels().unwrap()
+    };
+    balls.chunks(at_once).flat_map(of_part).collect()
+}
+
+/// A workgroup orders its instances by size, and each of its invocations takes several.
+/// Others beside an instance change nothing, so each counts as it does in an upload of few.
+#[test]
+fn others_change_no_count() {
+    let alone = counts_by_parts(&engine(), 30);
+    assert!(alone.iter().filter(|counts| counts.touched > 0).count() > 300);
+    assert_eq!(counts_by_parts(&engine(), 600), alone);
+    for (name, fault) in [
+        ("places in a class left out", (" + (key & PLACE_MASK)] =", "] =")),
+        ("what comes second left out", ("break if t >= small_count;", "break if t >= lane;")),
+    ] {
+        let engine = Engine::with_planted_faults(None, &[fault]).expect("a Vulkan driver");
+        assert_ne!(counts_by_parts(&engine, 600), alone, "{name}: stayed green");
+    }
+}
+
 /// A cull that counts nothing else, and what is refused.
 #[test]
 fn counts_are_an_output_of_their_own() {
@@ -288,7 +331,7 @@ fn large_rectangles_count_like_small_ones() {
 
 #[test]
 fn planted_faults_turn_it_red() {
-    let planted: [(&str, &[(&str, &str)]); 7] = [
+    let planted: [(&str, &[(&str, &str)]); 8] = [
         (
             "an edge pixel dropped",
             &[(
@@ -319,6 +362,10 @@ fn planted_faults_turn_it_red() {
         (
             "another texel entered",
             &[ALL_ARE_LARGE, ("| (VECTOR * at.x + k);", "| (VECTOR * at.x);")],
+        ),
+        (
+            "a sign of a difference reversed",
+            &[("signs_of(surface + most_over", "signs_of(-surface - most_over")],
         ),
         ("the depths of the row before", &[("depths = ahead;", "")]),
         (

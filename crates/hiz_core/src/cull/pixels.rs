@@ -20,11 +20,20 @@ use crate::input::bounds::BoundsKind;
 use crate::instances::piece::RECORD_BINDINGS;
 use crate::output::visible::Visible;
 
-/// Invocations of a workgroup, and its instances; `shaders/cull/pixels.wgsl`.
+/// Invocations of a workgroup; `shaders/cull/pixels.wgsl`.
 pub(crate) const WORKGROUP: u32 = 128;
+
+/// How many instances each of them takes at most; `shaders/cull/pixels.wgsl`.
+pub(crate) const MOST_PER_INVOCATION: u32 = 2;
 
 /// Invocations that count a large rectangle together; `shaders/cull/pixels_large.wgsl`.
 pub(crate) const TEAM: u32 = 8;
+
+/// How many instances each invocation takes.
+/// A processor pays for each barrier, and has few threads to take workgroups.
+fn per_invocation(gpu: &Gpu) -> u32 {
+    if gpu.is_processor() { MOST_PER_INVOCATION } else { 1 }
+}
 
 /// Workgroups that share the large rectangles out among them, at most.
 /// On a processor each costs time, and there are few threads to take them.
@@ -93,17 +102,23 @@ fn pixels_pipeline(
         source: pixels_module(key.store, key.kind),
         entry_point,
         layouts: &layouts(gpu, key.store, RECORD_BINDINGS, written)?,
-        constants: &pixels_constants(key, one_sample, shown),
+        constants: &pixels_constants(gpu, key, one_sample, shown),
     })
 }
 
 /// The constants of a count of pixels.
-fn pixels_constants(key: &CullKey, one_sample: bool, shown: bool) -> Vec<(&'static str, f64)> {
+fn pixels_constants(
+    gpu: &Gpu,
+    key: &CullKey,
+    one_sample: bool,
+    shown: bool,
+) -> Vec<(&'static str, f64)> {
     // The rectangle of a footprint and its fit have no effect, because every pixel is looked for.
     let key = CullKey { footprint_log2: 1, descent: true, fit_volume: true, ..*key };
     classify_constants(&key)
         .into_iter()
         .chain([("ONE_SAMPLE", flag(one_sample)), ("SHOWN", flag(shown))])
+        .chain([("PER_INVOCATION", f64::from(per_invocation(gpu)))])
         .collect()
 }
 
@@ -177,7 +192,8 @@ impl PixelPass {
                 ],
             )?;
             let count = if inputs.idle { 0 } else { piece.count() };
-            let workgroups = [count.div_ceil(WORKGROUP), count.div_ceil(TEAM).min(most_teams(gpu))];
+            let ordered = WORKGROUP * per_invocation(gpu);
+            let workgroups = [count.div_ceil(ordered), count.div_ceil(TEAM).min(most_teams(gpu))];
             Ok(CountedPiece { records, written, large, workgroups })
         };
         let pieces = instances.pieces.iter().enumerate().map(bound).collect::<Result<_>>()?;

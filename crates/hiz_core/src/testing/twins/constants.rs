@@ -98,6 +98,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/outcome", "AT_LEVEL", stage(Stage::Level)),
         ("cull/outcome", "AT_FRONT", stage(Stage::Front)),
         ("cull/pixels", "WORKGROUP", int(pixels::WORKGROUP)),
+        ("cull/pixels", "MOST_PER_INVOCATION", int(pixels::MOST_PER_INVOCATION)),
         ("cull/pixels_large", "TEAM", int(pixels::TEAM)),
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
@@ -198,7 +199,18 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/begin_mask", &["ALL_BITS", "FULL_BELOW"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
-    ("cull/pixels", &["SMALL_ROWS", "CLASSES_LOG2", "CLASSES"]),
+    (
+        "cull/pixels",
+        &[
+            "SMALL_ROWS",
+            "CLASSES_LOG2",
+            "CLASSES",
+            "ORDERED",
+            "CLASS_SHIFT",
+            "PLACE_MASK",
+            "NO_KEY",
+        ],
+    ),
     (
         "cull/pixels_large",
         &["STEP", "CHILD_ROWS", "CHUNK", "LISTED", "LISTS", "ROW_SHIFT", "COLUMN_MASK"],
