@@ -283,6 +283,24 @@ def test_both_halves_of_the_theorem_cull(device: hizvk.Device) -> None:
     assert result.verdicts[-1] == hizvk.Verdict.OUTSIDE
 
 
+@pytest.mark.parametrize("guard", [0.0, 0.25])
+def test_shadows_between_samples_are_looked_for_beside_them(
+    device: hizvk.Device, guard: float
+) -> None:
+    """Their rectangles hold no pixel centre, and the pixels on both sides show the same wall."""
+    camera = perspective((0, 0, 0), (0, 0, -1))
+    pyramid = device.pyramid(np.full(SIZE, 10.0), camera, kind="z", depths="receivers")
+    light = hizvk.DirectionalLight((0, -1, 0), receivers=((-50, -9, -50), (50, -3, 50)))
+    across = np.linspace(-15, 15, 301)
+    behind = np.stack([across, np.full(301, 5.0), np.full(301, -20.0)], axis=1)
+    on_it = behind * (0.5, 1.0, 0.5)
+    for middles, kept in ((behind, 0.0), (on_it, 1.0)):
+        casters = device.instances(hizvk.Spheres(middles, 0.001))
+        options = hizvk.CullOptions(coverage="sample", guard_px=guard)
+        mask = device.cull(casters, camera, pyramid, shadow=light, options=options).mask
+        assert mask.mean() == kept
+
+
 def test_an_invalid_pixel_keeps_what_may_shadow_it(device: hizvk.Device) -> None:
     camera = perspective((0, 0, 0), (0, 0, -1))
     light = hizvk.DirectionalLight((0, -1, 0), receivers=((-50, -9, -50), (50, 9, 50)))

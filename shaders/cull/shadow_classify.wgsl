@@ -32,6 +32,13 @@ fn swept_pixels(r: Swept, w: Swept, half_size: f32, size: i32) -> vec2<i32> {
     return vec2<i32>(vec2<f32>(clamp(floor(low), 0.0, edge), clamp(floor(high), -1.0, edge - 1.0)));
 }
 
+// An interval without a pixel, as between two samples, becomes the pixels on both sides of it.
+// These can be looked at, and the certificate of a block asks for no more.
+fn not_empty(pixels: vec2<i32>, size: i32) -> vec2<i32> {
+    let wider = clamp(pixels + vec2<i32>(-1, 1), vec2<i32>(0), vec2<i32>(size - 1));
+    return select(pixels, wider, pixels.x > pixels.y);
+}
+
 // The block of texels lo..=hi of a level spans every pixel that the swept volume can touch inside
 // the image, along one axis.
 fn swept_inside_block(
@@ -131,13 +138,10 @@ fn classify(i: u32) -> Outcome {
     }
 
     // 4. Which pixels may the shadow touch? This is an estimate.
-    out.stage = AT_RECTANGLE;
-    let columns = swept_pixels(x, w, view.half_size.x, view.size.x);
-    let rows = swept_pixels(y, w, view.half_size.y, view.size.y);
+    let columns =
+        not_empty(swept_pixels(x, w, view.half_size.x, view.size.x), view.size.x);
+    let rows = not_empty(swept_pixels(y, w, view.half_size.y, view.size.y), view.size.y);
     out.pixels = vec4<i32>(columns.x, rows.x, columns.y, rows.y);
-    if columns.x > columns.y || rows.x > rows.y {
-        return out;
-    }
     let first = vec2<u32>(vec2<i32>(columns.x, rows.x));
     let last = vec2<u32>(vec2<i32>(columns.y, rows.y));
     let level = stored_level(finest_level(first, last));
