@@ -32,6 +32,9 @@ const MOST_PARTS: usize = 16;
 /// Instances whose keys one thread computes at a time.
 const KEYED_AT_A_TIME: usize = 1 << 13;
 
+/// Words whose order one thread settles at a time.
+const SETTLED_AT_A_TIME: usize = 1 << 11;
+
 /// What is sorted is a word: the 40 highest bits of a key, above the index of the instance.
 /// A piece has at most 2^24 instances.
 const INDEX_BITS: u32 = 24;
@@ -43,6 +46,7 @@ const INDEX_BITS: u32 = 24;
 ///
 /// Every thread sorts one interval of the curve, which a sample of the keys makes about as long as
 /// the others.
+/// Then words that are equal are settled by the rest of their keys.
 pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>> {
     let cube = Cube::new(bounds, &range)?;
     let key = |index: usize| cube.key_of(bounds, range.start + index);
@@ -65,13 +69,20 @@ pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>
     });
     let mut sorted: Vec<Result<Vec<u64>>> = (0..threads).map(|_| Ok(Vec::new())).collect();
     on_threads(threads, sorted.iter_mut().enumerate(), |(part, sorted)| {
-        *sorted = words_of(&words, &ends, part).and_then(|mine| sort_part(mine, key));
+        *sorted = words_of(&words, &ends, part).and_then(sort_part);
     });
     drop((words, ends));
+    let mut sorted = sorted.into_iter().collect::<Result<Vec<_>>>()?;
     let mut order = memory::list(range.len(), "order")?;
-    for part in sorted {
-        order.extend(part?.iter().map(|word| index_of(*word) as u32));
-    }
+    order.resize(range.len(), 0);
+    // Equal words may all be in one part, so parts are cut anew.
+    let chunks = chunks_of_runs(&mut sorted, &mut order)?;
+    on_threads(threads, chunks, |(words, indices)| {
+        settle_equal_words(words, key);
+        for (index, word) in indices.iter_mut().zip(words) {
+            *index = index_of(*word) as u32;
+        }
+    });
     Ok(order)
 }
 
@@ -132,19 +143,50 @@ fn words_of(words: &[u64], ends: &[Ends], part: usize) -> Result<Vec<u64>> {
     Ok(mine)
 }
 
-/// Sorts the words of a part by the whole keys of their instances.
-/// The indices of equal keys ascend already.
-fn sort_part(mut mine: Vec<u64>, key: impl Fn(usize) -> u64) -> Result<Vec<u64>> {
+/// Sorts the words of a part; the indices of equal keys ascend already.
+fn sort_part(mut mine: Vec<u64>) -> Result<Vec<u64>> {
     let mut spare = memory::collected(mine.iter().copied(), "order")?;
     radix_sort(&mut mine, &mut spare);
-    drop(spare);
-    for run in mine.chunk_by_mut(|a, b| a >> INDEX_BITS == b >> INDEX_BITS) {
+    Ok(mine)
+}
+
+/// Whether two words have the same bits of their keys.
+fn are_equal(a: u64, b: u64) -> bool {
+    a >> INDEX_BITS == b >> INDEX_BITS
+}
+
+/// Sorted words, and what becomes of them: the indices in order.
+type Chunk<'a> = (&'a mut [u64], &'a mut [u32]);
+
+/// All words in chunks that part no equal ones.
+fn chunks_of_runs<'a>(sorted: &'a mut [Vec<u64>], order: &'a mut [u32]) -> Result<Vec<Chunk<'a>>> {
+    let most = sorted.iter().map(|part| part.len().div_ceil(SETTLED_AT_A_TIME)).sum();
+    let mut chunks = memory::list(most, "order")?;
+    let mut indices = order;
+    for part in sorted {
+        let mut words = &mut part[..];
+        while !words.is_empty() {
+            let mut end = words.len().min(SETTLED_AT_A_TIME);
+            while end < words.len() && are_equal(words[end - 1], words[end]) {
+                end += 1;
+            }
+            let (own, behind) = words.split_at_mut(end);
+            let (own_indices, indices_behind) = indices.split_at_mut(end);
+            chunks.push((own, own_indices));
+            (words, indices) = (behind, indices_behind);
+        }
+    }
+    Ok(chunks)
+}
+
+/// Sorts equal words by the whole keys of their instances.
+fn settle_equal_words(words: &mut [u64], key: impl Fn(usize) -> u64) {
+    for run in words.chunk_by_mut(|a, b| are_equal(*a, *b)) {
         if run.len() > 1 {
             // The rest of the keys decides; the indices of equal keys ascend.
             run.sort_by_cached_key(|word| key(index_of(*word)));
         }
     }
-    Ok(mine)
 }
 
 const DIGIT_BITS: u32 = 10;
@@ -279,14 +321,19 @@ mod tests {
         let n = 3 * KEYED_AT_A_TIME + 77;
         let words: Vec<u64> =
             (0..n).map(|i| key(i) >> INDEX_BITS << INDEX_BITS | i as u64).collect();
-        let whole = sort_part(words.clone(), key).unwrap();
+        let sorted = |words| {
+            let mut sorted = sort_part(words).unwrap();
+            settle_equal_words(&mut sorted, key);
+            sorted
+        };
+        let whole = sorted(words.clone());
         assert!(whole.is_sorted_by_key(|w| (key(index_of(*w)), index_of(*w))));
         for parts in [1, 2, 3, 7, 16] {
             let starts = starts(n, key, parts).unwrap();
             let mut grouped = vec![0; n];
             let chunks = words.chunks(KEYED_AT_A_TIME).zip(grouped.chunks_mut(KEYED_AT_A_TIME));
             let ends: Vec<_> = chunks.map(|(words, to)| group(words, &starts, to)).collect();
-            let part = |k| sort_part(words_of(&grouped, &ends, k).unwrap(), key).unwrap();
+            let part = |k| sorted(words_of(&grouped, &ends, k).unwrap());
             let joined: Vec<u64> = (0..parts).flat_map(part).collect();
             assert!(joined == whole, "{parts} parts");
         }

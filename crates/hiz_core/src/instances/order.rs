@@ -1,9 +1,11 @@
 //! The order in which the instances of a piece are stored, and the maps between places and indices.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::error::Result;
 use crate::host::memory;
+use crate::host::threads::{cores, on_threads};
 use crate::input::bounds::Bounds;
 use crate::instances::morton;
 
@@ -38,11 +40,7 @@ impl PieceOrder {
             return Ok(Self::default());
         }
         let indices = morton::order(bounds, range)?;
-        let mut places = memory::list(indices.len(), "order")?;
-        places.resize(indices.len(), 0);
-        for (place, index) in indices.iter().enumerate() {
-            places[*index as usize] = place as u32;
-        }
+        let places = inverse(&indices)?;
         Ok(Self { indices, places })
     }
 
@@ -87,4 +85,25 @@ impl PieceOrder {
     pub(super) fn host_bytes(&self) -> u64 {
         4 * (self.indices.capacity() + self.places.capacity()) as u64
     }
+}
+
+/// Indices whose places one thread writes at a time.
+const WRITTEN_AT_A_TIME: usize = 1 << 16;
+
+/// The place of each index.
+///
+/// Each index is there once, so no two threads write to the same place of the list.
+/// Atomics say so without `unsafe`, and cost nothing here.
+fn inverse(indices: &[u32]) -> Result<Vec<u32>> {
+    let mut places = memory::list(indices.len(), "order")?;
+    places.resize_with(indices.len(), AtomicU32::default);
+    let parts = indices.chunks(WRITTEN_AT_A_TIME).enumerate();
+    on_threads(parts.len().min(cores()), parts, |(part, indices)| {
+        let first = part * WRITTEN_AT_A_TIME;
+        for (place, index) in (first..).zip(indices) {
+            places[*index as usize].store(place as u32, Ordering::Relaxed);
+        }
+    });
+    // The numbers stay where they are: this takes no memory.
+    Ok(places.into_iter().map(AtomicU32::into_inner).collect())
 }

@@ -122,7 +122,8 @@ impl Piece {
 /// Makes a piece, its groups, and the uploads that bring both to the device.
 ///
 /// Large pieces are staged in several parts.
-/// `stage` takes the upload of each part but the last before the next one is packed.
+/// `stage` takes the upload of each part before the next one is packed, and that of the last one
+/// before the boxes of many groups are written.
 pub(super) fn packed(
     gpu: &Gpu,
     (bounds, kind): (&Bounds<'_>, BoundsKind),
@@ -164,6 +165,9 @@ pub(super) fn packed(
         })?;
         uploads.push(upload);
     }
+    if groups.len() >= MANY_GROUPS {
+        uploads.drain(..).try_for_each(|upload| stage(&upload))?;
+    }
     let num_groups = groups.len() as u32;
     let (group_records, groups_upload, ()) =
         Records::new(gpu, GROUPS_LABEL, num_groups, BOX_BYTES, |boxes| {
@@ -191,6 +195,10 @@ pub(super) fn unwritten(
     let order = (PieceOrder::default(), None);
     assembled(gpu, (index, range), num_groups, records, group_records, order)
 }
+
+/// From this many groups on, the device copies records while the groups' boxes are written.
+/// A submission takes as long as about a thousand of these.
+const MANY_GROUPS: usize = 1 << 12;
 
 const RECORDS_LABEL: &str = "hiz.instances.records";
 const GROUPS_LABEL: &str = "hiz.instances.groups";
