@@ -9,9 +9,9 @@ use common::{Random, camera_along_z, engine, ndc};
 use hiz_core::headless::{DepthImage, Engine};
 use hiz_core::testing::Made;
 use hiz_core::{
-    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Fit, Floats, Hierarchy, HizContext,
-    InstanceOptions, Instances, Order, Outputs, Pose, Projection, Pyramid, PyramidOptions, Visible,
-    wgpu,
+    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, DepthSource, Fit, Floats, Hierarchy,
+    HizContext, InstanceOptions, Instances, Order, Outputs, Pose, Projection, Pyramid,
+    PyramidOptions, ReceiverMaskOptions, Visible, wgpu,
 };
 
 const WIDTH: u32 = 61;
@@ -113,7 +113,9 @@ fn ways() -> Vec<(CullOptions, Outputs)> {
     for hierarchy in [Hierarchy::Never, Hierarchy::Always] {
         for order in [Order::Stable, Order::Any] {
             for statistics in [false, true] {
-                for outputs in [Outputs::ALL, Outputs { mask: true, ..Outputs::NONE }] {
+                let mask = Outputs { mask: true, ..Outputs::NONE };
+                let counts = Outputs { pixels: true, ..mask.clone() };
+                for outputs in [Outputs::ALL, mask, counts] {
                     let options =
                         CullOptions { hierarchy, order, statistics, ..CullOptions::default() };
                     ways.push((options, outputs));
@@ -183,6 +185,32 @@ fn frames_make_nothing_anew() {
                 assert!(new_buffers <= 8, "{atlas:?} {way:?}: {new_buffers} buffers");
             }
         }
+    }
+}
+
+/// The same of receiver masks of two depth images in turn.
+#[test]
+fn receiver_masks_make_nothing_anew() {
+    let renderer = Renderer::new();
+    let Renderer { engine, context } = &renderer;
+    for of_kind in images(engine).chunks(3) {
+        let light = camera(0);
+        let mask = context.create_receiver_mask(light.size()).unwrap();
+        let mut before = context.made();
+        for frame in 0..FIRST + FRAMES {
+            if frame == FIRST {
+                before = context.made();
+            }
+            let (depth, options) = (&of_kind[frame as usize % 2], ReceiverMaskOptions::default());
+            let (depth, camera) = (DepthSource::from(depth.texture()), camera(frame));
+            let mut encoder = renderer.encoder();
+            context
+                .record_receiver_mask(&mut encoder, depth, &camera, &light, &mask, &options)
+                .unwrap();
+            renderer.submit(encoder);
+            engine.wait().unwrap();
+        }
+        assert_eq!(context.made(), before);
     }
 }
 

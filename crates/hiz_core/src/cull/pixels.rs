@@ -17,7 +17,7 @@ use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
 use crate::input::bounds::BoundsKind;
-use crate::instances::piece::RECORD_BINDINGS;
+use crate::instances::piece::{Piece, RECORD_BINDINGS};
 use crate::output::visible::Visible;
 
 /// Invocations of a workgroup; `shaders/cull/pixels.wgsl`.
@@ -122,6 +122,43 @@ fn pixels_constants(
         .collect()
 }
 
+/// The bind group of what the count of a piece writes, made by the first one.
+fn bind_counted(
+    gpu: &Gpu,
+    visible: &Visible,
+    piece: usize,
+    negligible: Option<u32>,
+) -> Result<wgpu::BindGroup> {
+    let output = &visible.pieces[piece];
+    let counts = output.pixels.as_ref().expect("the outputs have counts");
+    let large = output.large.as_ref().expect("a list beside the counts");
+    check_alive(counts)?;
+    output.counted.get(negligible, || {
+        let shown = match negligible {
+            Some(_) => output.mask.clone(),
+            None => gpu.stand_in("hiz.pixels.no_mask")?,
+        };
+        let counting = gpu.uniform(
+            "hiz.pixels.counting",
+            &CountingUniform {
+                budget: visible.outputs().pixel_budget.unwrap_or(u32::MAX).max(1),
+                negligible: negligible.unwrap_or(0),
+                padding: [0; 2],
+            },
+        )?;
+        gpu.bind_group(
+            "hiz.pixels.counts",
+            &gpu.layout("hiz.pixels.layout", COUNTED_BINDINGS)?,
+            &[
+                entry(0, counts.as_entire_binding()),
+                entry(1, shown.as_entire_binding()),
+                entry(2, counting.as_entire_binding()),
+                entry(3, large.as_entire_binding()),
+            ],
+        )
+    })
+}
+
 /// A count that is prepared: nothing that it records can fail any more.
 #[derive(Debug)]
 pub(crate) struct PixelPass {
@@ -163,34 +200,11 @@ impl PixelPass {
             pixels_pipeline(gpu, &seen.key, flags, "count_of_pixels")?,
             pixels_pipeline(gpu, &seen.key, flags, "count_of_many_pixels")?,
         ];
-        let counting = gpu.uniform(
-            "hiz.pixels.counting",
-            &CountingUniform {
-                budget: visible.outputs().pixel_budget.unwrap_or(u32::MAX).max(1),
-                negligible: negligible.unwrap_or(0),
-                padding: [0; 2],
-            },
-        )?;
-        let bound = |(p, piece): (usize, &crate::instances::piece::Piece)| {
+        let bound = |(p, piece): (usize, &Piece)| {
             let output = &visible.pieces[p];
-            let counts = output.pixels.as_ref().expect("the outputs have counts");
             let large = output.large.clone().expect("a list beside the counts");
-            check_alive(counts)?;
-            let shown = match negligible {
-                Some(_) => output.mask.clone(),
-                None => gpu.stand_in("hiz.pixels.no_mask")?,
-            };
+            let written = bind_counted(gpu, visible, p, negligible)?;
             let records = inputs.among.map_or(&piece.bindings, |among| among.records(p)).clone();
-            let written = gpu.bind_group(
-                "hiz.pixels.counts",
-                &gpu.layout("hiz.pixels.layout", COUNTED_BINDINGS)?,
-                &[
-                    entry(0, counts.as_entire_binding()),
-                    entry(1, shown.as_entire_binding()),
-                    entry(2, counting.as_entire_binding()),
-                    entry(3, large.as_entire_binding()),
-                ],
-            )?;
             let count = if inputs.idle { 0 } else { piece.count() };
             let ordered = WORKGROUP * per_invocation(gpu);
             let workgroups = [count.div_ceil(ordered), count.div_ceil(TEAM).min(most_teams(gpu))];

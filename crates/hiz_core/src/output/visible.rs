@@ -7,6 +7,7 @@ use std::ops::Range;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{STORAGE, made};
 use crate::gpu::device::{ContextId, Gpu};
+use crate::gpu::kept::KeptBindings;
 use crate::instances::Instances;
 use crate::instances::piece::Piece;
 use crate::output::bins::{Arrangement, Bins};
@@ -35,7 +36,12 @@ pub(crate) struct PieceOutput {
     /// What culls bind, made by the first of each kind.
     /// Culls that count levels come second, and those of bins in any order come last.
     pub(crate) bindings: [OnceLock<wgpu::BindGroup>; 4],
+    /// What counts of pixels bind, by the number of pixels that is negligible, if any.
+    pub(crate) counted: KeptBindings<Option<u32>>,
 }
+
+/// So many numbers of negligible pixels may take turns without a bind group made anew.
+const NEGLIGIBLE_KEPT: usize = 2;
 
 /// What a cull finds, on the device.
 ///
@@ -310,6 +316,7 @@ impl PieceOutput {
             large: outputs.pixels.then(large).transpose()?,
             groups: OnceLock::new(),
             bindings: Default::default(),
+            counted: KeptBindings::new(NEGLIGIBLE_KEPT),
         })
     }
 

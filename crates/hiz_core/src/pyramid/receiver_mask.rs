@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::{ContextId, Gpu};
+use crate::gpu::kept::KeptBindings;
 use crate::gpu::layouts::Binding;
 use crate::gpu::numbers::Copy;
 use crate::gpu::pipelines::{Compute, flag};
@@ -22,7 +23,8 @@ use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::PIXELS;
-use crate::pyramid::source::{DepthSource, Part, Sampling};
+use crate::pyramid::reduce::refused;
+use crate::pyramid::source::{DepthSource, Part, Sampling, Subresource};
 
 /// Invocations along a side of a workgroup; twin: `SIDE` in the shader.
 pub(crate) const MASK_SIDE: u32 = 8;
@@ -93,7 +95,12 @@ pub struct ReceiverMask {
     uniform: wgpu::Buffer,
     bindings: wgpu::BindGroup,
     image: wgpu::Texture,
+    /// By the camera's depth image and how it is read.
+    sources: KeptBindings<(Subresource, SourceKind)>,
 }
+
+/// For how many depth images bind groups are kept.
+const KEPT_IMAGES: usize = 3;
 
 /// Words from a row of the image to the next: rows of a copy begin at multiples of 256 bytes.
 fn stride(size: ImageSize) -> u32 {
@@ -152,7 +159,8 @@ impl ReceiverMask {
             wgpu::TextureFormat::Rgba32Uint,
             usage,
         )?;
-        Ok(Self { context: gpu.id(), size, keys, uniform, bindings, image })
+        let sources = KeptBindings::new(KEPT_IMAGES);
+        Ok(Self { context: gpu.id(), size, keys, uniform, bindings, image, sources })
     }
 
     /// The size of the light's image in pixels.
@@ -203,6 +211,27 @@ fn pipeline(
     })
 }
 
+/// The bind group of the depth image, kept from an earlier recording of the same image.
+fn bind_source(gpu: &Gpu, part: &Part, mask: &ReceiverMask) -> Result<wgpu::BindGroup> {
+    let key = (part.subresource.clone(), part.kind);
+    if let Some(kept) = mask.sources.find(&key) {
+        // A bind group does not tell that its texture was destroyed since, but a new view does.
+        gpu.view(&part.subresource.texture).map_err(refused)?;
+        return Ok(kept);
+    }
+    let view = part.subresource.view(gpu).map_err(refused)?;
+    let bound = gpu.bind_group(
+        "hiz.receiver_mask.source",
+        &gpu.layout("hiz.receiver_mask.source_layout", &source_bindings(part.kind))?,
+        &[
+            entry(0, wgpu::BindingResource::TextureView(&view)),
+            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
+        ],
+    );
+    let bound = bound.map_err(refused)?;
+    mask.sources.get(key, || Ok(bound))
+}
+
 /// Records the scatter of `depth` into `mask`, and the copy into its image.
 ///
 /// # Errors
@@ -234,15 +263,7 @@ pub(crate) fn record_receiver_mask(
         ));
     }
     let numbers = mask_uniform([camera, light], &part, options)?;
-    let view = part.subresource.view(gpu)?;
-    let source = gpu.bind_group(
-        "hiz.receiver_mask.source",
-        &gpu.layout("hiz.receiver_mask.source_layout", &source_bindings(part.kind))?,
-        &[
-            entry(0, wgpu::BindingResource::TextureView(&view)),
-            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
-        ],
-    )?;
+    let source = bind_source(gpu, &part, mask)?;
     let reversed = camera.convention().is_reversed();
     let scatter = pipeline(gpu, part.kind, "scatter_receivers", reversed)?;
     let finish = pipeline(gpu, part.kind, "finish_receivers", reversed)?;
