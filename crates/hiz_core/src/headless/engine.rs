@@ -29,12 +29,15 @@ const DEPTH_KEPT_BYTES: u64 = 1 << 25;
 const DEPTH_SIZES: usize = 2;
 const DEPTH_KEPT: usize = 2;
 
-/// Bytes of a block of memory that wgpu takes from a processor that serves as device, and keeps.
+/// What lavapipe calls itself.
+const LAVAPIPE: &str = "llvmpipe";
+
+/// Bytes of a block of memory that wgpu takes from lavapipe, and keeps.
 ///
 /// Records of 4 million boxes fit one.
 /// Their pages are then new to the process once, and not at every upload (`docs/performance.md`).
 /// It is the most that wgpu takes at once.
-const PROCESSOR_BLOCK_BYTES: u64 = 256 << 20;
+const LAVAPIPE_BLOCK_BYTES: u64 = 256 << 20;
 
 /// A device, its queue and the pipelines on it.
 /// The last clone waits until the device is idle, and releases it.
@@ -338,16 +341,15 @@ impl Engine {
 
 /// How large the blocks are that wgpu cuts buffers and textures from.
 ///
-/// Vulkan's software drivers take memory as the host's programs do: what was never written costs
-/// nothing.
+/// Mesa's lavapipe takes memory as the host's programs do: what was never written costs nothing.
 /// So blocks may be large there.
+/// SwiftShader fills what it takes: with such blocks it opened a device in 0.3 s in place of 0.2 s,
+/// and a process took 330 MiB in place of 140.
 fn memory_hints(adapter: &wgpu::AdapterInfo) -> wgpu::MemoryHints {
-    match (adapter.device_type, adapter.backend) {
-        (wgpu::DeviceType::Cpu, wgpu::Backend::Vulkan) => {
-            // Such a driver's memory is the host's, whose blocks are half as large.
-            let bytes = 2 * PROCESSOR_BLOCK_BYTES;
-            wgpu::MemoryHints::Manual { suballocated_device_memory_block_size: bytes..bytes }
-        }
-        _ => wgpu::MemoryHints::default(),
+    if adapter.backend != wgpu::Backend::Vulkan || adapter.driver != LAVAPIPE {
+        return wgpu::MemoryHints::default();
     }
+    // Such a driver's memory is the host's, whose blocks are half as large.
+    let bytes = 2 * LAVAPIPE_BLOCK_BYTES;
+    wgpu::MemoryHints::Manual { suballocated_device_memory_block_size: bytes..bytes }
 }
