@@ -112,13 +112,19 @@ fn edge_plane(
     (*planes).outlines[i] = select(offset, NO_PLANE, guess.is_steep);
 }
 
-// The planes through both edges of the outline along an axis.
-fn outline_planes(
-    planes: ptr<function, PixelPlanes>, axis: u32, begin: Face, end: Face, signs: vec4<f32>,
-    a: Face, b: Face, p: Projected, most: vec2<f32>,
-) {
-    edge_plane(planes, 2u * axis, begin, end, signs.xy, a, b, p, most);
-    edge_plane(planes, 2u * axis + 1u, begin, end, signs.zw, a, b, p, most);
+// The faces at both ends of each axis.
+struct Axes {
+    first_0: Face,
+    second_0: Face,
+    first_1: Face,
+    second_1: Face,
+    first_2: Face,
+    second_2: Face,
+}
+
+// The same, with axis 1 in the place of axis 0.
+fn next_axis(v: Axes) -> Axes {
+    return Axes(v.first_1, v.second_1, v.first_2, v.second_2, v.first_0, v.second_0);
 }
 
 fn fill_planes(planes: ptr<function, PixelPlanes>, p: Projected, most: vec2<f32>) {
@@ -139,21 +145,27 @@ fn fill_planes(planes: ptr<function, PixelPlanes>, p: Projected, most: vec2<f32>
         vec4<f32>(a.x.xz, b.x.xz), vec4<f32>(a.y.xz, b.y.xz), vec4<f32>(a.z.xz, b.z.xz));
     let f = Face(
         vec4<f32>(a.x.yw, b.x.yw), vec4<f32>(a.y.yw, b.y.yw), vec4<f32>(a.z.yw, b.z.yw));
-    let face_a = face_plane(a, b, true, p, most);
-    let face_b = face_plane(b, a, false, p, most);
-    let face_c = face_plane(c, d, true, p, most);
-    let face_d = face_plane(d, c, false, p, most);
-    let face_e = face_plane(e, f, true, p, most);
-    let face_f = face_plane(f, e, false, p, most);
-    (*planes).faces = array<vec4<f32>, FACE_PLACES>(face_a, face_b, face_c, face_d, face_e, face_f);
-
-    let facing_0 = facing_of(face_a, face_b);
-    let facing_1 = facing_of(face_c, face_d);
-    let facing_2 = facing_of(face_e, face_f);
-    let along_0 = outline_signs(vec2<f32>(facing_1, facing_2));
-    let along_1 = outline_signs(vec2<f32>(facing_0, facing_2));
-    let along_2 = outline_signs(vec2<f32>(facing_0, facing_1));
-    outline_planes(planes, 0u, b, a, along_0, a, b, p, most);
-    outline_planes(planes, 1u, d, c, along_1, a, b, p, most);
-    outline_planes(planes, 2u, f, e, along_2, a, b, p, most);
+    // Loops over the axes keep the code short.
+    // Without them SwiftShader takes tens of gigabytes to compile it.
+    // Each step hands on the next axis, since lavapipe is slow to index arrays.
+    var axes = Axes(a, b, c, d, e, f);
+    var facing = vec3<f32>(0.0);
+    for (var axis = 0u; 2u * axis < FACE_PLANES; axis += 1u) {
+        let first = face_plane(axes.first_0, axes.second_0, true, p, most);
+        let second = face_plane(axes.second_0, axes.first_0, false, p, most);
+        (*planes).faces[2u * axis] = first;
+        (*planes).faces[2u * axis + 1u] = second;
+        facing = vec3<f32>(facing.yz, facing_of(first, second));
+        axes = next_axis(axes);
+    }
+    // Two edges of the outline along each axis; the facing is that of the other two axes.
+    for (var axis = 0u; 2u * axis < OUTLINE_PLANES; axis += 1u) {
+        let signs = outline_signs(select(facing.yz, facing.zy, axis == 1u));
+        let begin = axes.second_0;
+        let end = axes.first_0;
+        edge_plane(planes, 2u * axis, begin, end, signs.xy, a, b, p, most);
+        edge_plane(planes, 2u * axis + 1u, begin, end, signs.zw, a, b, p, most);
+        facing = facing.yzx;
+        axes = next_axis(axes);
+    }
 }

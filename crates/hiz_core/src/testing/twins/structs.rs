@@ -45,6 +45,7 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     // Vertex inputs, which are found by location; see `occluders/device_meshes.rs`.
     "Copy",
     "Vertex",
+    "Axes",
     "Ends",
     "Ends2",
     "Ends4",
