@@ -303,6 +303,23 @@ def while_threads_cull() -> None:
         forked(by_default)
 
 
+def all_cores(_: int = 0) -> int:
+    """Sort and cull so many spheres on a new device that all cores of the host help."""
+    centers = np.random.default_rng(2010).uniform((-9, -9, -60), (9, 9, -1), (300_000, 3))
+    device = hizvk.Device()
+    instances = device.instances(hizvk.Spheres(centers, 0.1))
+    result = device.cull(instances, CAMERA, device.pyramid(WALL, CAMERA, kind="z"))
+    return int(result.mask.sum())
+
+
+def all_cores_in_a_fork() -> None:
+    """The threads that helped stay behind."""
+    expected = all_cores()
+    assert 0 < expected < 300_000
+    forked(lambda: all_cores() == expected)
+    assert all_cores() == expected
+
+
 def pools() -> None:
     """Workers of pools, and workers of workers."""
     assert by_default() == SEEN
@@ -346,6 +363,8 @@ def main(scene: str) -> None:
     elif scene == "threads_of_a_child":
         inherits()
         forked(with_threads, ends="exit")
+    elif scene == "all_cores_in_a_fork":
+        all_cores_in_a_fork()
     elif scene == "while_threads_cull":
         while_threads_cull()
     elif scene == "while_the_driver_compiles":

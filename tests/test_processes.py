@@ -101,6 +101,7 @@ def test_a_fork_is_told_of_its_parents_objects() -> None:
         ("default", ["[True, False]", "status 5", "[True, False]", "status 0"]),
         ("no_device", ["nothing", "status 5"]),
         ("threads_of_a_child", ["[True, False]", "status 5"]),
+        ("all_cores_in_a_fork", ["True", "status 0"]),
         ("while_threads_cull", ["[True, False]", "status 0"] * 5),
         (
             "while_the_driver_compiles",

@@ -1,7 +1,10 @@
 //! Locks, and work that is split between threads.
 
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
-use std::thread::{Builder, available_parallelism, scope};
+use std::thread::available_parallelism;
+
+use rayon_core::{ThreadPool, ThreadPoolBuilder};
 
 /// A value behind a lock that ignores poisoning.
 ///
@@ -28,17 +31,41 @@ pub(crate) fn cores() -> usize {
 
 /// How many threads to use for work that takes one thread about so many nanoseconds.
 ///
-/// A thread has to be scheduled, which takes milliseconds where another process is at work.
-/// So each one has to take over a quarter of a millisecond.
+/// A thread that sleeps takes 20 to 100 microseconds until it works.
+/// So each one has to take over more than that.
 pub(crate) fn worth_it(nanoseconds: u64) -> usize {
-    cores().min(1 + usize::try_from(nanoseconds / 250_000).unwrap_or(usize::MAX))
+    cores().min(1 + usize::try_from(nanoseconds / 100_000).unwrap_or(usize::MAX))
 }
 
-/// Runs `work` on every part, on at most `threads` threads; this one is the first of them.
+/// The threads that help, one for each core; `None` where they cannot be had.
+///
+/// They stay behind where the process that made them forks, so its forks have none.
+fn helpers() -> Option<&'static ThreadPool> {
+    static OWNER: AtomicU32 = AtomicU32::new(0);
+    static HELPERS: OnceLock<Option<ThreadPool>> = OnceLock::new();
+    let me = std::process::id();
+    // First, because a fork must not wait for a thread of its parent that makes them.
+    let owner = OWNER.compare_exchange(0, me, Ordering::Relaxed, Ordering::Relaxed);
+    if owner.is_err_and(|owner| owner != me) {
+        return None;
+    }
+    let made = HELPERS.get_or_init(|| {
+        let named = ThreadPoolBuilder::new().thread_name(|number| format!("hiz_core {number}"));
+        named.num_threads(cores()).build().ok()
+    });
+    made.as_ref()
+}
+
+/// Runs `work` on every part, on about `threads` threads; this one is the first of them.
 ///
 /// The parts are handed out in their order, each to the next thread that is free.
 /// So more parts than threads even out parts of unequal size.
-/// Where no thread can be spawned, fewer do the work.
+/// Where no thread can be had, this one does the work.
+///
+/// The threads that help stay, because a new one costs more than some work is worth.
+/// One more is woken than is needed: a system may wake a thread on the core of the one that wakes
+/// it, where it waits until that one is done, although another core is idle.
+/// Linux does so in a virtual machine whose idle cores were handed back to the host.
 pub(crate) fn on_threads<T: Send>(
     threads: usize,
     parts: impl IntoIterator<Item = T, IntoIter: Send>,
@@ -51,13 +78,11 @@ pub(crate) fn on_threads<T: Send>(
             work(part);
         }
     };
-    scope(|scope| {
-        let helpers: Vec<_> =
-            (1..threads).map_while(|_| Builder::new().spawn_scoped(scope, run).ok()).collect();
+    let helpers = if threads > 1 { helpers() } else { None };
+    let Some(helpers) = helpers else { return run() };
+    helpers.in_place_scope(|scope| {
+        (0..threads.min(cores())).for_each(|_| scope.spawn(|_| run()));
         run();
-        for helper in helpers {
-            helper.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        }
     });
 }
 
