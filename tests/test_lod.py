@@ -80,9 +80,37 @@ def test_distances_need_a_perspective_camera() -> None:
     pyramid = device.pyramid(np.full(SIZE, 5.0), camera, kind="z")
     crowd = device.instances(hizvk.Spheres(np.array([[0.0, 0.0, -2.0]]), 0.5))
     with pytest.raises(ValueError, match="lod: expected a rule by error or by size"):
-        device.cull(crowd, camera, pyramid, lod=hizvk.LodByDistance([1.0]))
+        device.cull(crowd, camera, pyramid, hizvk.CullOptions(lod=hizvk.LodByDistance([1.0])))
     for rule in (hizvk.LodByError(1.0), hizvk.LodBySize([10.0]), None):
-        assert device.cull(crowd, camera, pyramid, lod=rule).mask.tolist() == [True]
+        options = hizvk.CullOptions(lod=rule)
+        assert device.cull(crowd, camera, pyramid, options).mask.tolist() == [True]
+
+
+def test_keywords_that_would_do_nothing_are_refused() -> None:
+    device = hizvk.Device()
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=SIZE, near=0.1)
+    wall = np.full(SIZE, 5.0)
+    pyramid = device.pyramid(wall, camera, kind="z")
+    spheres = hizvk.Spheres(np.array([[0.0, 0.0, -2.0]]), 0.5)
+    crowd = device.instances(spheres)
+    refused = {"lod": hizvk.LodByError(1.0), "emit": "instances", "placement": "reserved"}
+    for name, value in refused.items():
+        asked: dict[str, Any] = {name: value}
+        with pytest.raises(ValueError, match=f"^{name}: expected meshes= beside it.*without mes"):
+            device.cull(crowd, camera, pyramid, **asked)
+        with pytest.raises(ValueError, match=rf"^{name}: expected meshes= beside it"):
+            device.warm_up(crowd, camera, **asked)
+    with pytest.raises(ValueError, match=r'^pixel_budget: expected "pixels" among the outputs'):
+        device.cull(crowd, camera, pyramid, pixel_budget=8)
+    # The defaults, and objects that calls with and without meshes share, say nothing.
+    shared = hizvk.CullOptions(lod=refused["lod"]), hizvk.Outputs(placement="reserved")
+    assert device.cull(crowd, camera, pyramid, *shared).mask.tolist() == [True]
+    silent = device.cull(crowd, camera, pyramid, lod=None, emit="bins", placement="packed")
+    assert silent.mask.tolist() == [True]
+    with pytest.raises(ValueError, match=r"^lod: expected None, because visible lists nothing"):
+        hizvk.visible(spheres, camera, depth=wall, kind="z", lod=refused["lod"])
+    with pytest.raises(ValueError, match=r"^lod: expected None, because cull_approximate lists"):
+        device.cull_approximate(crowd, camera, pyramid, negligible_px=1, lod=refused["lod"])
 
 
 ERRORS = [[0.0, 0.004, 0.03, 0.2], [0.0, 0.1]]

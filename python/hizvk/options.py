@@ -318,7 +318,7 @@ class CullOptions:
         Whether to count the tests on each level and the texels that they read; this is slower.
     lod : LodByError, LodByDistance or LodBySize, optional
         Which level of detail of its mesh a kept instance is drawn with.
-        It says nothing without `Outputs.meshes`.
+        It says nothing without `Outputs.meshes`, and as a keyword of a cull it is refused then.
         None: the full mesh, LOD 0.
     shadow : DirectionalLight, optional
         The instances are shadow casters of this light, and kept is what may shadow something that
@@ -406,6 +406,7 @@ class Outputs:
         None: one list with one draw.
     emit : "bins" or "instances"
         What a draw is, beside `meshes`.
+        Without these, as a keyword of a cull, it is refused, and so is `placement`.
         ``"bins"``: all that is kept of one mesh at one LOD.
         ``"instances"``: one kept instance; the draws ascend by index.
     placement : "packed" or "reserved"
@@ -497,11 +498,17 @@ _SINGLE: Final = {name: _outputs_of((name,)) for name in OUTPUTS}
 
 
 def cull_options(
-    options: object, keywords: Mapping[str, Any], of: Callable[..., object]
+    options: object,
+    keywords: Mapping[str, Any],
+    of: Callable[..., object],
+    *,
+    lists_levels: bool = False,
 ) -> CullOptions:
     """The options (None: the defaults), with `keywords` in the place of their fields.
 
     `of` is the function that takes both, for the error of an unknown keyword.
+    Where it does not list by level of detail, the keyword ``lod`` would do nothing, so it is
+    refused; options that several calls share may have one.
     """
     chosen = _OPTIONS
     if options is not None:
@@ -509,7 +516,13 @@ def cull_options(
     if not keywords:
         return chosen
     _arguments.refuse_unknown(keywords, OptionKeywords.__annotations__, of)
-    return _replaced(chosen, keywords)
+    made = _replaced(chosen, keywords)
+    if not lists_levels and keywords.get("lod") is not None:
+        raise ValueError(
+            f"lod: expected None, because {of.__name__} lists nothing by level of detail, got "
+            f"{_arguments.describe(keywords['lod'])}; Device.cull(..., meshes=, lod=) does"
+        )
+    return made
 
 
 def cull_request(
@@ -526,5 +539,29 @@ def cull_request(
     if outputs is None:
         outputs = _OUTPUTS
     made = outputs if isinstance(outputs, Outputs) else _outputs_of(outputs)
-    chosen = cull_options(options, of_options, of)
-    return chosen, _replaced(made, of_outputs) if of_outputs else made
+    chosen = cull_options(options, of_options, of, lists_levels=True)
+    if of_outputs:
+        made = _replaced(made, of_outputs)
+    if keywords:
+        _refuse_silent(keywords, made)
+    return chosen, made
+
+
+def _refuse_silent(keywords: Mapping[str, Any], outputs: Outputs) -> None:
+    """A `ValueError` for a keyword that does nothing beside these outputs."""
+    if keywords.get("pixel_budget") is not None and not outputs.pixels:
+        raise ValueError(
+            'pixel_budget: expected "pixels" among the outputs beside it, because it is the budget '
+            f"of their pass, got {keywords['pixel_budget']} without; pass outputs=[..., "
+            '"pixels"], or leave it out'
+        )
+    if outputs.meshes is not None:
+        return
+    for name, silent in (("lod", None), ("emit", _OUTPUTS.emit), ("placement", _OUTPUTS.placement)):
+        given = keywords.get(name, silent)
+        if given != silent:
+            raise ValueError(
+                f"{name}: expected meshes= beside it, because one list has neither meshes nor "
+                f"levels of detail, got {_arguments.describe(given)} without meshes; pass "
+                "meshes=[...], a MeshLods for each mesh, or leave it out"
+            )

@@ -216,7 +216,7 @@ class Temporal(Allocated[CoreTwoPasses]):
             If the device cannot hold the image.
         """
         _arguments.instance("camera", camera, Camera, "a Camera")
-        chosen = cull_options(options, keywords, self.late)
+        chosen = cull_options(options, keywords, self.late, lists_levels=True)
         if chosen.lod is not None:
             raise ValueError(
                 "lod: expected None, because the passes answer masks, which tell no levels of "
