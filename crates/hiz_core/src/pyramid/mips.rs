@@ -1,13 +1,11 @@
 //! A texture with real mip levels of depth, for shaders of the caller's own.
 
 use crate::error::{Error, Result};
-use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::{ContextId, Gpu};
-use crate::gpu::kept::Kept;
 use crate::input::image::ImageSize;
 use crate::pyramid::mips_bindings::MipBindings;
 use crate::pyramid::mips_plan::{self, MipPlan};
-use crate::pyramid::source::Subresource;
+use crate::pyramid::sources::Sources;
 
 /// WGSL functions that find texels of a mip texture: sizes, texels, levels.
 ///
@@ -149,11 +147,8 @@ pub struct MipTexture {
     pub(super) texture: wgpu::Texture,
     view: wgpu::TextureView,
     pub(super) bindings: MipBindings,
-    pub(super) sources: Kept<(Subresource, SourceKind), wgpu::BindGroup>,
+    pub(super) sources: Sources,
 }
-
-/// For how many depth images bind groups are kept.
-const KEPT_IMAGES: usize = 3;
 
 impl MipTexture {
     pub(crate) fn new(gpu: &Gpu, size: ImageSize, options: &MipOptions) -> Result<Self> {
@@ -194,7 +189,7 @@ impl MipTexture {
             texture,
             bindings: MipBindings::new(gpu, &plan)?,
             plan,
-            sources: Kept::new(KEPT_IMAGES),
+            sources: Sources::new(),
         })
     }
 

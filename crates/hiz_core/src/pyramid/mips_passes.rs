@@ -16,8 +16,8 @@ use crate::pyramid::levels::Level;
 use crate::pyramid::mips::{MipDepths, MipLookup, MipTexture};
 use crate::pyramid::mips_bindings::{MipsUniform, STEP_BINDINGS};
 use crate::pyramid::mips_plan::MipStep;
-use crate::pyramid::reduce::refused;
 use crate::pyramid::source::{DepthSource, Part, Sampling};
+use crate::pyramid::sources::Binds;
 
 /// Invocations of a workgroup; twin: `shaders/pyramid/mips.wgsl`, `WORKGROUP`.
 pub(crate) const WORKGROUP: u32 = 64;
@@ -213,25 +213,17 @@ fn copy(
     );
 }
 
-/// The bind group of the depth image, kept from an earlier recording of the same image.
+/// The bind group of the depth image.
 fn bind_source(gpu: &Gpu, part: &Part, mips: &MipTexture) -> Result<wgpu::BindGroup> {
-    let key = (part.subresource.clone(), part.kind);
-    if let Some(kept) = mips.sources.find(&key) {
-        // A bind group does not tell that its texture was destroyed since, but a new view does.
-        gpu.view(&part.subresource.texture).map_err(refused)?;
-        return Ok(kept);
-    }
-    let view = part.subresource.view(gpu).map_err(refused)?;
-    let bound = gpu.bind_group(
-        "hiz.mips.source",
-        &gpu.layout("hiz.mips.layout", &bindings(part.kind))?,
-        &[
-            entry(0, wgpu::BindingResource::TextureView(&view)),
+    let binds = Binds {
+        label: "hiz.mips.source",
+        layout: "hiz.mips.layout",
+        bindings: &bindings(part.kind),
+        rest: &[
             entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
             entry(2, mips.bindings.uniform.as_entire_binding()),
             entry(3, mips.bindings.list.as_entire_binding()),
         ],
-    );
-    let bound = bound.map_err(refused)?;
-    mips.sources.get(key, || Ok(bound))
+    };
+    mips.sources.bind(gpu, part, part.kind, &binds)
 }

@@ -34,6 +34,7 @@ pub(crate) mod reduce;
 pub(crate) mod region;
 pub(crate) mod resolve;
 pub(crate) mod source;
+mod sources;
 pub(crate) mod steps;
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -53,7 +54,7 @@ use crate::pyramid::built::{Built, Owner};
 use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::{PYRAMID_CHUNKS, PyramidLayout, chunk_shift};
 use crate::pyramid::levels::{Level, MAX_LEVELS, StoredLevels};
-use crate::pyramid::source::Subresource;
+use crate::pyramid::source::{KEPT_IMAGES, Subresource};
 use crate::pyramid::steps::Steps;
 
 /// Twin of `Pyramid` in `shaders/pyramid/pyramid.wgsl`.
@@ -69,10 +70,6 @@ pub(crate) struct PyramidUniform {
 }
 
 const _: () = assert!(size_of::<PyramidUniform>() == 528);
-
-/// For how many depth images bind groups are kept, by reductions and by culls.
-/// A renderer may alternate between a few.
-const KEPT_IMAGES: usize = 3;
 
 /// What tells the bind groups of reductions apart: the image, that of nearest samples, the kind.
 pub(crate) type SourceKey = (Subresource, Option<wgpu::Texture>, SourceKind);

@@ -10,7 +10,6 @@ use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::{ContextId, Gpu};
-use crate::gpu::kept::KeptBindings;
 use crate::gpu::layouts::Binding;
 use crate::gpu::numbers::Copy;
 use crate::gpu::pipelines::{Compute, flag};
@@ -23,8 +22,8 @@ use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::PIXELS;
-use crate::pyramid::reduce::refused;
-use crate::pyramid::source::{DepthSource, Part, Sampling, Subresource};
+use crate::pyramid::source::{DepthSource, Part, Sampling};
+use crate::pyramid::sources::{Binds, Sources};
 
 /// Invocations along a side of a workgroup; twin: `SIDE` in the shader.
 pub(crate) const MASK_SIDE: u32 = 8;
@@ -96,11 +95,8 @@ pub struct ReceiverMask {
     bindings: wgpu::BindGroup,
     image: wgpu::Texture,
     /// By the camera's depth image and how it is read.
-    sources: KeptBindings<(Subresource, SourceKind)>,
+    sources: Sources,
 }
-
-/// For how many depth images bind groups are kept.
-const KEPT_IMAGES: usize = 3;
 
 /// Words from a row of the image to the next: rows of a copy begin at multiples of 256 bytes.
 fn stride(size: ImageSize) -> u32 {
@@ -159,7 +155,7 @@ impl ReceiverMask {
             wgpu::TextureFormat::Rgba32Uint,
             usage,
         )?;
-        let sources = KeptBindings::new(KEPT_IMAGES);
+        let sources = Sources::new();
         Ok(Self { context: gpu.id(), size, keys, uniform, bindings, image, sources })
     }
 
@@ -211,25 +207,15 @@ fn pipeline(
     })
 }
 
-/// The bind group of the depth image, kept from an earlier recording of the same image.
+/// The bind group of the depth image.
 fn bind_source(gpu: &Gpu, part: &Part, mask: &ReceiverMask) -> Result<wgpu::BindGroup> {
-    let key = (part.subresource.clone(), part.kind);
-    if let Some(kept) = mask.sources.find(&key) {
-        // A bind group does not tell that its texture was destroyed since, but a new view does.
-        gpu.view(&part.subresource.texture).map_err(refused)?;
-        return Ok(kept);
-    }
-    let view = part.subresource.view(gpu).map_err(refused)?;
-    let bound = gpu.bind_group(
-        "hiz.receiver_mask.source",
-        &gpu.layout("hiz.receiver_mask.source_layout", &source_bindings(part.kind))?,
-        &[
-            entry(0, wgpu::BindingResource::TextureView(&view)),
-            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
-        ],
-    );
-    let bound = bound.map_err(refused)?;
-    mask.sources.get(key, || Ok(bound))
+    let binds = Binds {
+        label: "hiz.receiver_mask.source",
+        layout: "hiz.receiver_mask.source_layout",
+        bindings: &source_bindings(part.kind),
+        rest: &[entry(1, wgpu::BindingResource::Sampler(gpu.sampler()))],
+    };
+    mask.sources.bind(gpu, part, part.kind, &binds)
 }
 
 /// Records the scatter of `depth` into `mask`, and the copy into its image.

@@ -8,7 +8,6 @@ use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::{ContextId, Gpu};
-use crate::gpu::kept::Kept;
 use crate::gpu::layouts::Binding;
 use crate::gpu::numbers::Copy;
 use crate::gpu::pipelines::{Compute, flag};
@@ -20,17 +19,14 @@ use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::PIXELS;
-use crate::pyramid::reduce::refused;
-use crate::pyramid::source::{DepthSource, Part, Sampling, Subresource};
+use crate::pyramid::source::{DepthSource, Part, Sampling};
+use crate::pyramid::sources::{Binds, Sources};
 
 /// Invocations of a workgroup; twin: `shaders/pyramid/resolve.wgsl`, `WORKGROUP`.
 pub(crate) const WORKGROUP: u32 = 64;
 
 /// Bytes of the buffer at most; larger images go through it in bands.
 const BAND_BYTES: u64 = 1 << 26;
-
-/// For how many multisampled textures bind groups are kept.
-const KEPT_IMAGES: usize = 3;
 
 /// Which depths of a pixel's samples are kept.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -138,7 +134,7 @@ pub struct DepthResolve {
     bands: Vec<Band>,
     farthest: Option<wgpu::Texture>,
     nearest: Option<wgpu::Texture>,
-    sources: Kept<(Subresource, SourceKind), wgpu::BindGroup>,
+    sources: Sources,
     /// Samples and tolerance of what was resolved last.
     resolved: Locked<Option<(u32, DepthTolerance)>>,
 }
@@ -190,7 +186,7 @@ impl DepthResolve {
             bands: bands.into_iter().map(bind).collect::<Result<_>>()?,
             farthest,
             nearest,
-            sources: Kept::new(KEPT_IMAGES),
+            sources: Sources::new(),
             resolved: Locked::default(),
         })
     }
@@ -419,31 +415,23 @@ fn prepare(
     Ok((part, pipeline, samples))
 }
 
-/// The bind group of the samples, kept from an earlier resolve of the same texture.
+/// The bind group of the samples.
 fn bind_samples(
     gpu: &Gpu,
     part: &Part,
     kind: SourceKind,
     resolve: &DepthResolve,
 ) -> Result<wgpu::BindGroup> {
-    let key = (part.subresource.clone(), kind);
-    if let Some(kept) = resolve.sources.find(&key) {
-        // A bind group does not tell that its texture was destroyed since, but a new view does.
-        gpu.view(&part.subresource.texture).map_err(refused)?;
-        return Ok(kept);
-    }
-    let view = part.subresource.view(gpu).map_err(refused)?;
-    let bound = gpu.bind_group(
-        "hiz.resolve.samples",
-        &gpu.layout("hiz.resolve.layout", &bindings(kind))?,
-        &[
-            entry(0, wgpu::BindingResource::TextureView(&view)),
+    let binds = Binds {
+        label: "hiz.resolve.samples",
+        layout: "hiz.resolve.layout",
+        bindings: &bindings(kind),
+        rest: &[
             entry(1, resolve.rows.as_entire_binding()),
             entry(2, resolve.image.as_entire_binding()),
         ],
-    );
-    let bound = bound.map_err(refused)?;
-    resolve.sources.get(key, || Ok(bound))
+    };
+    resolve.sources.bind(gpu, part, kind, &binds)
 }
 
 /// Records the pass that resolves some rows, and the copies into the textures.

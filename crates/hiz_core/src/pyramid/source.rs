@@ -8,6 +8,10 @@ use crate::input::near_slack::NearSlack;
 use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::ends::Depths;
 
+/// For how many depth images bind groups are kept, by reductions, culls and other stages.
+/// A renderer may alternate between a few.
+pub(super) const KEPT_IMAGES: usize = 3;
+
 /// A depth image in a texture: one layer of one mip level, or a rectangle of it.
 ///
 /// A texture, or a view of it, converts by `From`: its only layer and mip level, from corner to
