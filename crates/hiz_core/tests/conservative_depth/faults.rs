@@ -48,9 +48,12 @@ fn planted_faults_of_the_search_let_rays_through() {
 /// Pixels that no threshold proves are searched with facets in integers.
 #[test]
 fn planted_faults_of_the_search_in_integers_let_rays_through() {
-    for fault in
-        [PlantedFault::ContoursIgnored, PlantedFault::DepthAtCentre, PlantedFault::FoldsIgnored]
-    {
+    for fault in [
+        PlantedFault::ContoursIgnored,
+        PlantedFault::DepthAtCentre,
+        PlantedFault::FoldsIgnored,
+        PlantedFault::CentreForQuarter,
+    ] {
         let of = |way| campaign(way, 1, 600, Some(fault)).iter().map(|t| t.past).sum::<u32>();
         let (usual, any) = (of(Way::Usual), of(Way::AnyCentres));
         println!("{fault:?}: {usual} and {any} rays past a pixel's depth");

@@ -7,6 +7,7 @@
 //! Where such a triangle is in the pixel's first slab, nothing is much nearer at the centre.
 //! No other set can give the pixel a depth that is much nearer, so no other is tried.
 //! A triangle that is much larger than a pixel decides most of its pixels in this way.
+//! Where it is beyond that slab, its depth is where the search begins.
 //!
 //! [`REACH`]: crate::occluders::surface::facets::REACH
 
@@ -15,14 +16,11 @@ use crate::occluders::surface::facets::{Corner, Facet, reach};
 use crate::occluders::surface::looks::{TILE, Tiles};
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::squares::Squares;
-use crate::occluders::surface::thresholds::Slabs;
 
 /// The pixels of some rows, with what single triangles show of them.
 pub(super) struct Alone<'a> {
     pub(super) grid: Grid,
     pub(super) tiles: &'a Tiles,
-    /// By pixel.
-    pub(super) slabs: &'a [Slabs],
     /// By pixel: the nearest depth that a triangle gives; infinity without one.
     pub(super) depths: &'a mut [f32],
     pub(super) fault: Planted,
@@ -54,11 +52,8 @@ impl Alone<'_> {
                             *far = Facet::rounded(most, fault);
                         }
                         let run = line + begin as usize..=line + end as usize;
-                        let pixels = self.depths[run.clone()].iter_mut().zip(&self.slabs[run]);
-                        for ((depth, slabs), far) in pixels.zip(all) {
-                            if far <= slabs.farthest[0] && far < *depth {
-                                *depth = far;
-                            }
+                        for (depth, far) in self.depths[run].iter_mut().zip(all) {
+                            *depth = if far < *depth { far } else { *depth };
                         }
                     }
                     begin = end + 1;

@@ -4,9 +4,6 @@
 
 use crate::occluders::surface::facets::{Corner, REACH, UNITS};
 
-/// Squares that are tested together where a triangle is large.
-const RUN: i32 = 8;
-
 /// A part of a grid of squares over the image.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
@@ -107,10 +104,10 @@ impl EdgeFunctions {
         })
     }
 
-    /// Whether the triangle covers the point that is so many units right of one with these values.
+    /// Whether the triangle covers the point that is so many steps right of one with these values.
     #[inline(always)]
-    pub(super) fn covers(&self, values: [i64; 3], units: i64) -> bool {
-        let [a, b, c] = std::array::from_fn(|k| values[k] + units * self.right[k]);
+    fn covers(&self, values: [i64; 3], steps: i64) -> bool {
+        let [a, b, c] = std::array::from_fn(|k| values[k] + steps * self.right[k]);
         (a | b | c) >= 0
     }
 }
@@ -163,21 +160,22 @@ impl Sides {
     /// The same for the points that are so many units left or right and above or below.
     ///
     /// They are in the order of [`QUARTERS`].
+    /// Then whether the triangle covers the squares around them, where `half` is half a side: it
+    /// covers the point, and no side of it meets the square.
     #[inline]
-    pub(super) fn windings(&self, units: i32) -> [i32; 4] {
-        let units = i64::from(units);
-        let mut outside = [0; 4];
+    pub(super) fn around(&self, units: i32, half: i32) -> ([i32; 4], [bool; 4]) {
+        let [units, half] = [units, half].map(i64::from);
+        let (mut outside, mut beside) = ([0; 4], [0; 4]);
         for k in 0..3 {
             let (value, right, down) = (self.value[k], units * self.right[k], units * self.down[k]);
-            for (outside, [x, y]) in outside.iter_mut().zip(QUARTERS) {
-                *outside |= value + i64::from(x) * right + i64::from(y) * down;
+            let most = (self.right[k].abs() + self.down[k].abs()) * half;
+            for (i, [x, y]) in QUARTERS.into_iter().enumerate() {
+                let at = value + i64::from(x) * right + i64::from(y) * down;
+                outside[i] |= at;
+                beside[i] |= at - most - 1;
             }
         }
-        let mut windings = [0; 4];
-        for (winding, outside) in windings.iter_mut().zip(outside) {
-            *winding = if outside >= 0 { self.sense } else { 0 };
-        }
-        windings
+        (outside.map(|outside| if outside >= 0 { self.sense } else { 0 }), beside.map(|v| v >= 0))
     }
 }
 
@@ -186,12 +184,12 @@ pub(super) const QUARTERS: [[i32; 2]; 4] = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
 
 /// Calls `cover` for the squares whose centres a triangle covers.
 ///
-/// Runs of 8 squares, at multiples of 8, may be left out where `is_hidden` says so of the first.
+/// `wanted` says of which columns of a row, from a first to a last one, squares are wanted at all.
 #[inline]
-pub(super) fn for_each_centre(
+pub(super) fn for_each_centre<Columns: Iterator<Item = i32>>(
     corners: [Corner; 3],
     grid: Grid,
-    is_hidden: impl Fn(i32, i32) -> bool,
+    wanted: impl Fn(i32, [i32; 2]) -> Columns,
     mut cover: impl FnMut(i32, i32),
 ) {
     let [p, q, r] = corners;
@@ -201,36 +199,18 @@ pub(super) fn for_each_centre(
         return;
     }
     let functions = EdgeFunctions::new(corners);
-    let EdgeFunctions { right, down, .. } = functions;
     // Divided by the side of a square: floors keep the sign, and all values in a row or column
     // differ by whole steps.
     let mut value =
         functions.at(grid.centre(columns[0]), grid.centre(rows[0])).map(|v| v >> grid.log2);
-    let is_large = columns[1] - columns[0] >= 2 * RUN;
     for y in rows[0]..=rows[1] {
-        let mut now = value;
-        let mut x = columns[0];
-        while x <= columns[1] {
-            if is_large && x % RUN == 0 && x + RUN - 1 <= columns[1] {
-                let misses = |k: usize| now[k].max(now[k] + i64::from(RUN - 1) * right[k]) < 0;
-                if (0..3).any(misses) || is_hidden(x, y) {
-                    for k in 0..3 {
-                        now[k] += i64::from(RUN) * right[k];
-                    }
-                    x += RUN;
-                    continue;
-                }
-            }
-            if (now[0] | now[1] | now[2]) >= 0 {
+        for x in wanted(y, columns) {
+            if functions.covers(value, i64::from(x - columns[0])) {
                 cover(x, y);
             }
-            for k in 0..3 {
-                now[k] += right[k];
-            }
-            x += 1;
         }
         for k in 0..3 {
-            value[k] += down[k];
+            value[k] += functions.down[k];
         }
     }
 }
@@ -354,6 +334,7 @@ mod tests {
         };
         let grid = Grid { log2: UNITS.ilog2(), columns: [0, 3], rows: [0, 3] };
         let (mut covered, mut whole) = ([0; 2], 0);
+        let (mut agreed, mut asked) = ([0_u32; 2], [0_u32; 2]);
         for _ in 0..20_000 {
             // Many sides run through centres, which are odd multiples of 128.
             let corners = [0; 3].map(|_| [below(12) * 128 - 256, below(12) * 128 - 256]);
@@ -362,7 +343,7 @@ mod tests {
             for_each_centre(
                 [a, b, c],
                 grid,
-                |_, _| false,
+                |_, [first, last]| first..=last,
                 |x, y| {
                     found[y as usize][x as usize] = true;
                 },
@@ -376,7 +357,7 @@ mod tests {
                     assert_eq!(sides.winding(), expected, "{corners:?} {x} {y}");
                     for (k, [dx, dy]) in QUARTERS.into_iter().enumerate() {
                         let nearby = Sides::new(&corners, [x - 64 * dx, y - 64 * dy]);
-                        assert_eq!(nearby.windings(64)[k], expected, "{corners:?} {x} {y}");
+                        assert_eq!(nearby.around(64, 0).0[k], expected, "{corners:?} {x} {y}");
                     }
                     covered[usize::from(found)] += 1;
                 }
@@ -389,6 +370,18 @@ mod tests {
                     expected[y as usize][x as usize] = false;
                 });
             }
+            for (y, row) in (0..).zip(expected) {
+                for (x, expected) in (0..).zip(row) {
+                    let [x, y] = [x, y].map(|place| grid.centre(place));
+                    for (k, [dx, dy]) in QUARTERS.into_iter().enumerate() {
+                        let sides = Sides::new(&corners, [x - 64 * dx, y - 64 * dy]);
+                        let inside = sides.around(64, UNITS / 2 + REACH).1[k];
+                        assert!(expected || !inside, "{corners:?} {x} {y}");
+                        agreed[usize::from(expected)] += u32::from(inside == expected);
+                        asked[usize::from(expected)] += 1;
+                    }
+                }
+            }
             for (reach, expected) in [(Some(REACH), expected), (None, found)] {
                 let mut inside = [[false; 4]; 4];
                 for_each_run_inside([a, b, c], grid, reach, |[first, last], y| {
@@ -398,6 +391,7 @@ mod tests {
                 whole += inside.as_flattened().iter().filter(|inside| **inside).count();
             }
         }
+        assert!(asked[1] > 10_000 && agreed[1] > asked[1] / 100 * 99, "{agreed:?} {asked:?}");
         assert!(covered[1] > 10_000 && whole > covered[1], "{covered:?} {whole}");
     }
 }

@@ -1,7 +1,6 @@
 //! The conservative depths of an image: thresholds, proof, search.
 
 use crate::host::threads::{cores, on_threads};
-use crate::host::vectors::widest;
 use crate::input::camera::Camera;
 use crate::occluders::surface::cells::Cells;
 use crate::occluders::surface::facets::{Facet, Rounder};
@@ -88,20 +87,15 @@ pub(super) fn image(
     let has_uncertain = looks.has_uncertain;
     let walk = Walk { placed, rounder, looks: &looks, links };
     let mut far = proved(&walk, &mut slabs, &tried, size);
-    let is_open = widest(
-        #[inline(always)]
-        || {
-            let is_open = |(far, slabs): (&f32, &Slabs)| (*far == f32::INFINITY) & slabs.is_any();
-            far.iter().zip(&slabs).map(is_open).collect()
-        },
-    );
-    let open = OpenPixels::new(size, is_open);
+    let open = OpenPixels::new(size, slabs.iter().map(Slabs::is_any).collect());
     if !open.is_empty() {
         let pixels = open.of_rows([0, size.height.cast_signed() - 1]);
-        let bound = |pixel: &u32| centres.bounds(*pixel, &slabs[*pixel as usize]);
-        let bounds: Vec<[f32; 2]> = pixels.iter().map(bound).collect();
-        let last = pixels.iter().zip(&bounds).map(|(pixel, bounds)| (*pixel, bounds[1]));
-        let tiles = Tiles::of(last, size);
+        let bound = |pixel: &u32| {
+            let (known, slabs) = (far[*pixel as usize], &slabs[*pixel as usize]);
+            centres.bound(*pixel, slabs).min(known)
+        };
+        let bounds: Vec<f32> = pixels.iter().map(bound).collect();
+        let tiles = Tiles::of(pixels.iter().copied().zip(bounds.iter().copied()), size);
         looks.add(&placed, camera, rounder, &Sought { tiles: &tiles, open: Some(&open) });
         let walk = Walk { placed, rounder, looks: &looks, links };
         search(&walk, &open, &bounds, beyond, refinement, &mut far);

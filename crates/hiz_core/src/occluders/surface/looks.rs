@@ -199,6 +199,8 @@ pub(super) struct Look {
     boxes: Vec<PixelBox>,
     /// Bit k: facet k is there.
     there: u128,
+    /// Bit k: facet k is there, and was cut.
+    cut: u128,
     pub(super) polygons: Vec<Polygon>,
 }
 
@@ -337,6 +339,7 @@ impl Look {
             boxes,
             polygons,
             there: 0,
+            cut: 0,
         }
     }
 
@@ -446,14 +449,13 @@ impl Look {
         self.there >> (triangle & 127) & 1 != 0
     }
 
-    /// Whether an edge is of a facet that is there, whole, and not one of `near`.
+    /// The facets that are there, whole, and not some of `near`: bit k for facet k.
     ///
-    /// Both ends are corners of that facet, so the edge meets no pixel that the facet's box has
-    /// not.
+    /// The ends of their edges are their corners, so the edges meet no pixel that the facets' boxes
+    /// have not.
     #[inline(always)]
-    pub(super) fn is_beyond(&self, edge: &Edge, near: u128) -> bool {
-        let is_near = near >> (edge.triangle & 127) & 1 != 0;
-        self.has(edge.triangle) && !is_near && !self.facets[usize::from(edge.triangle)].is_cut
+    pub(super) fn beyond(&self, near: u128) -> u128 {
+        self.there & !near & !self.cut
     }
 
     /// The ends of an edge, if none is cut off.
@@ -539,6 +541,7 @@ impl Look {
             }
             if facet.is_there() {
                 self.there |= 1 << t;
+                self.cut |= u128::from(facet.is_cut) << t;
                 self.facets[t] = facet;
                 let (columns, rows) = around.pixels(size);
                 let is_whole = !is_planted!(placed.fault, BoxesTooSmall);

@@ -13,8 +13,8 @@ pub(super) const NO_PIECE: u32 = u32::MAX;
 
 /// A facet that meets an open pixel.
 #[derive(Debug)]
-pub(super) struct Piece<'a> {
-    pub(super) facet: &'a Facet,
+pub(super) struct Piece {
+    pub(super) facet: Facet,
     /// Its first triangle; most have no other.
     corners: [[i32; 2]; 3],
     /// Whether there are more in `Meeting::more`.
@@ -36,11 +36,11 @@ pub(super) struct Edge {
 pub(super) struct Meeting<'a> {
     walk: &'a Walk<'a>,
     squares: Squares<'a>,
-    /// By pixel: what comes after the second value is left out.
-    bounds: &'a [[f32; 2]],
+    /// By pixel: what comes after this is left out.
+    bounds: &'a [f32],
     /// By the number of a facet: its piece, or [`NO_PIECE`].
     by_number: Vec<u32>,
-    pub(super) pieces: Vec<Piece<'a>>,
+    pub(super) pieces: Vec<Piece>,
     /// Further triangles of pieces, sorted by piece.
     more: Vec<(u32, [[i32; 2]; 3])>,
     pub(super) edges: Vec<Edge>,
@@ -89,7 +89,7 @@ impl<'a> Meeting<'a> {
         walk: &'a Walk<'a>,
         open: &'a OpenPixels,
         rows: [i32; 2],
-        bounds: &'a [[f32; 2]],
+        bounds: &'a [f32],
     ) -> Self {
         let mut meeting = Self {
             walk,
@@ -116,20 +116,34 @@ impl<'a> Meeting<'a> {
     }
 
     /// How often a piece winds about a point, if it is turned to the sense +1.
-    ///
-    /// Then the same for four points around it, see [`Sides::windings`].
-    #[inline]
-    pub(super) fn windings(&self, piece: u32, point: [i32; 2], units: i32) -> (i32, [i32; 4]) {
+    pub(super) fn winding(&self, piece: u32, point: [i32; 2]) -> i32 {
         let own = &self.pieces[piece as usize];
-        let sides = Sides::new(&own.corners, point);
-        let (mut sum, mut sums) = (sides.winding(), sides.windings(units));
-        for corners in self.more_of(piece) {
-            let sides = Sides::new(corners, point);
-            sum += sides.winding();
-            sums.iter_mut().zip(sides.windings(units)).for_each(|(sum, more)| *sum += more);
+        let all = std::iter::once(&own.corners).chain(self.more_of(piece));
+        let sum: i32 = all.map(|corners| Sides::new(corners, point).winding()).sum();
+        sum * i32::from(own.facet.sign)
+    }
+
+    /// The same for four points around it, and whether it covers the squares around these as a
+    /// whole, see [`Sides::around`].
+    #[inline]
+    pub(super) fn around(
+        &self,
+        piece: u32,
+        point: [i32; 2],
+        (units, half): (i32, i32),
+    ) -> ([i32; 4], [bool; 4]) {
+        let own = &self.pieces[piece as usize];
+        let (mut sums, mut inside) = Sides::new(&own.corners, point).around(units, half);
+        if own.has_more {
+            // What one part covers, another one may cover turned round.
+            inside = [false; 4];
+            for corners in self.more_of(piece) {
+                let more = Sides::new(corners, point).around(units, half).0;
+                sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+            }
         }
         let sign = i32::from(own.facet.sign);
-        (sum * sign, sums.map(|sum| sum * sign))
+        (sums.map(|sum| sum * sign), inside)
     }
 
     /// The further triangles of a piece.
@@ -168,7 +182,7 @@ impl<'a> Meeting<'a> {
         let has_more = before < self.more.len();
         // A facet that is there has a triangle.
         let corners = first.unwrap_or_default();
-        let facet = &look.facets[usize::from(triangle)];
+        let facet = look.facets[usize::from(triangle)];
         self.pieces.push(Piece { facet, corners, has_more });
         own
     }
@@ -183,7 +197,7 @@ impl<'a> Meeting<'a> {
         let (number, borders) = (self.edges.len() as u32, &mut self.borders);
         let (bounds, nearest) = (self.bounds, one.facet.nearest.min(other.facet.nearest));
         self.squares.for_each_met([a, b], reach(self.walk.placed.fault), |square| {
-            if nearest < f64::from(bounds[square.number][1]) {
+            if nearest < f64::from(bounds[square.number]) {
                 borders.push((square.number as u32, number));
             }
         });
@@ -210,8 +224,8 @@ impl Visitor for Meeting<'_> {
     fn cover(&mut self, met: Met<'_>, corners: [Corner; 3]) {
         let first = self.covers.len();
         let (covers, bounds, nearest) = (&mut self.covers, self.bounds, met.facet.nearest);
-        let is_wanted = |number: usize| nearest < f64::from(bounds[number][1]);
-        self.squares.for_each_covered(met.facet, corners, is_wanted, |square| {
+        let is_wanted = |number: usize| nearest < f64::from(bounds[number]);
+        self.squares.for_each_covered(corners, is_wanted, |square| {
             covers.push((square.number as u32, 0));
         });
         if first < self.covers.len() {

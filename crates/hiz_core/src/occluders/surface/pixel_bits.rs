@@ -50,10 +50,29 @@ impl PixelBits {
         })
     }
 
-    /// Whether any of eight pixels is in the set, from one at a multiple of 8 to the right.
+    /// The pixels of a row of the set from the first to the last column.
     #[inline]
-    pub(super) fn any_of_eight(&self, x: i32, y: i32) -> bool {
-        self.bits[self.line(y) + x.cast_unsigned() as usize / 64] >> (x & 56) & 255 != 0
+    pub(super) fn of_row(&self, y: i32, [first, last]: [i32; 2]) -> impl Iterator<Item = i32> {
+        let line = &self.bits[self.line(y)..][..self.words];
+        let (mut word, end) = (first >> 6, last >> 6);
+        let bits = move |word: i32| {
+            let from = if word == first >> 6 { u64::MAX << (first & 63) } else { u64::MAX };
+            let to = if word == end { u64::MAX >> (63 - (last & 63)) } else { u64::MAX };
+            if first > last { 0 } else { line[word.cast_unsigned() as usize] & from & to }
+        };
+        let mut left = bits(word);
+        std::iter::from_fn(move || {
+            while left == 0 {
+                word += 1;
+                if word > end {
+                    return None;
+                }
+                left = bits(word);
+            }
+            let x = word * 64 + left.trailing_zeros().cast_signed();
+            left &= left - 1;
+            Some(x)
+        })
     }
 
     /// Calls `each` with the numbers of the pixels, in rows from the first one.
@@ -104,9 +123,13 @@ mod tests {
             }
         }
         assert!(found[0] > 1000 && found[1] > 1000, "{found:?}");
-        for x in (0..width).step_by(8) {
-            let any = (x..x + 8).any(|x| x < width && is_in(x, 4));
-            assert_eq!(bits.any_of_eight(x, 4), any, "{x}");
+        for y in 3..=6 {
+            for x0 in 0..width {
+                for x1 in x0 - 1..width {
+                    let found: Vec<i32> = bits.of_row(y, [x0, x1]).collect();
+                    assert_eq!(found, (x0..=x1).filter(|x| is_in(*x, y)).collect::<Vec<_>>());
+                }
+            }
         }
     }
 }

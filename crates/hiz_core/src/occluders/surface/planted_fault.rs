@@ -65,7 +65,9 @@ pub enum PlantedFault {
     NoEdgeMargin,
     /// There, a triangle that covers a pixel's centre covers the pixel.
     CentreForSquare,
-    /// There, edges to triangles that were left out are no borders.
+    /// In the search, a triangle that covers the centre of a quarter covers the quarter.
+    CentreForQuarter,
+    /// In the proof, edges to triangles that were left out are no borders.
     LeftOutNeighboursIgnored,
     /// There and in the search, the box of a triangle's pixels has the first of them alone.
     BoxesTooSmall,

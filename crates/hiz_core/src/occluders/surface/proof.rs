@@ -20,6 +20,8 @@
 //!
 //! [`REACH`]: crate::occluders::surface::facets::REACH
 
+use std::cmp::Reverse;
+
 use crate::host::threads::{cores, on_threads, worth_it};
 use crate::host::vectors::widest;
 use crate::input::image::ImageSize;
@@ -43,7 +45,8 @@ const PER_LOOK: u64 = 10_000;
 ///
 /// Infinity where that cannot be shown.
 ///
-/// Leaves the slabs of the pixels that are covered by one triangle empty.
+/// Leaves the slabs of the pixels that are done empty.
+/// The others may have a depth, too: that of one triangle which is beyond the first slab.
 pub(super) fn proved(
     walk: &Walk<'_>,
     slabs: &mut [Slabs],
@@ -54,13 +57,18 @@ pub(super) fn proved(
     let ns = PER_PIXEL * depths.len() as u64 + PER_LOOK * walk.looks.all.len() as u64;
     let part = (band_rows(size) * size.width) as usize;
     let bands = depths.chunks_mut(part).zip(slabs.chunks_mut(part)).zip(bands(size));
+    let mut bands: Vec<_> = bands.collect();
+    // The last one to be done should be a small one.
+    bands.sort_by_cached_key(|(_, rows)| {
+        Reverse(walk.looks.all.iter().filter(|look| look.is_in_rows(*rows)).count())
+    });
     on_threads(worth_it(ns), bands, |((depths, slabs), rows)| {
         let grid = grid(size.width, rows);
         let left = widest(
             #[inline(always)]
             || {
                 let fault = walk.placed.fault;
-                let mut alone = Alone { grid, tiles, slabs, depths, fault };
+                let mut alone = Alone { grid, tiles, depths, fault };
                 for look in walk.looks.all.iter().filter(|look| look.is_in_rows(rows)) {
                     let here = look.within(
                         #[inline(always)]
@@ -74,16 +82,23 @@ pub(super) fn proved(
                     );
                 }
                 for (slabs, depth) in slabs.iter_mut().zip(&*depths) {
-                    if *depth < f32::INFINITY {
+                    if *depth <= slabs.farthest[0] {
                         *slabs = Slabs::NONE;
                     }
                 }
                 PixelBits::new(size.width, rows[0], slabs, Slabs::is_any)
             },
         );
-        let mut band = Band::new(Squares::left(grid, &left, tiles), slabs, walk.placed.fault);
+        let mut band = Band::new(Squares::left(grid, &left), slabs, walk.placed.fault);
         walk.visit(|look| left.any(look.columns, look.rows), &mut band);
-        left.for_each(|number| depths[number] = band.states[number].depth());
+        let states = band.states;
+        left.for_each(|number| {
+            let (found, depth) = (states[number].depth(), &mut depths[number]);
+            if found < f32::INFINITY {
+                *depth = depth.min(found);
+                slabs[number] = Slabs::NONE;
+            }
+        });
     });
     depths
 }
@@ -172,7 +187,7 @@ impl Visitor for Band<'_> {
         let steps = Steps::of(facet.sign, own);
         let (slabs, states, half, fault) = (self.slabs, &mut self.states, self.half, self.fault);
         let is_wanted = |number: usize| facet.nearest <= f64::from(slabs[number].last());
-        self.squares.for_each_covered(facet, corners, is_wanted, |square| {
+        self.squares.for_each_covered(corners, is_wanted, |square| {
             let (mask, far) = is_in(facet, &square, half, &slabs[square.number], fault);
             if mask != 0 {
                 let state = &mut states[square.number];
@@ -246,9 +261,11 @@ fn is_in(facet: &Facet, square: &Place, half: f64, slabs: &Slabs, fault: Planted
         return (0, f32::NEG_INFINITY);
     }
     let (far, near) = facet.range(square.centre[0], square.centre[1], half);
-    #[expect(clippy::cast_possible_truncation, reason = "for a choice alone")]
-    let (far, near) = (Facet::rounded(far, fault), near as f32);
-    let [first, second] = slabs.farthest.map(|farthest| far <= farthest);
-    let mask = Mask::from(first) | Mask::from(second && near >= slabs.nearest) << 1;
-    (mask, far)
+    // What is rounded up to a float32 is beyond another one where it was before.
+    let [first, second] = slabs.farthest.map(|farthest| far <= f64::from(farthest));
+    let mask = Mask::from(first) | Mask::from(second && near >= f64::from(slabs.nearest)) << 1;
+    if mask == 0 {
+        return (0, f32::NEG_INFINITY);
+    }
+    (mask, Facet::rounded(far, fault))
 }

@@ -9,6 +9,10 @@
 //! Then sheets are joined across them, and what winds an odd number of times covers.
 //!
 //! Where a nearer sheet covers a part alone, the quarters are asked.
+//! Before that, single facets tell how near a quarter may become at best, and which quarters they
+//! cover as a whole; most squares end there.
+
+use std::cmp::Reverse;
 
 use crate::host::threads::{on_threads, worth_it};
 use crate::occluders::surface::coverage::QUARTERS;
@@ -32,13 +36,12 @@ const PER_LOOK: u64 = 5_000;
 /// Lowers the values of `far` of the open pixels: every ray through the closed square of a pixel is
 /// blocked there or before.
 ///
-/// By open pixel, `bounds` are the values at which the search stops at first, and if it has found
-/// nothing then.
+/// By open pixel, `bounds` are the values at which the search stops.
 /// `beyond` is the value at the far plane, and `refinement` how often a pixel is quartered.
 pub(super) fn search(
     walk: &Walk<'_>,
     open: &OpenPixels,
-    bounds: &[[f32; 2]],
+    bounds: &[f32],
     beyond: f32,
     refinement: u32,
     far: &mut [f32],
@@ -46,11 +49,12 @@ pub(super) fn search(
     let size = open.size();
     let part = (band_rows(size) * size.width) as usize;
     let ns = PER_PIXEL * bounds.len() as u64 + PER_LOOK * walk.looks.all.len() as u64;
-    on_threads(worth_it(ns), far.chunks_mut(part).zip(bands(size)), |(far, rows)| {
+    let mut parts: Vec<_> = far.chunks_mut(part).zip(bands(size)).collect();
+    parts.retain(|(_, rows)| !open.of_rows(*rows).is_empty());
+    // The last one to be done should be a small one.
+    parts.sort_by_key(|(_, rows)| Reverse(open.of_rows(*rows).len()));
+    on_threads(worth_it(ns), parts, |(far, rows)| {
         let pixels = open.of_rows(rows);
-        if pixels.is_empty() {
-            return;
-        }
         let bounds = &bounds[open.number(0, rows[0])..][..pixels.len()];
         let meeting = Meeting::new(walk, open, rows, bounds);
         let [covers, borders] = meeting.lists(pixels.len());
@@ -63,12 +67,10 @@ pub(super) fn search(
                 continue;
             }
             let square = Square { centre, half: UNITS / 2 };
-            for bound in bounds[i] {
-                let found = search.blocked(0, (square, 0), bound, refinement);
-                if found < bound {
-                    *far = found;
-                    break;
-                }
+            let bound = (bounds[i], *far < f32::INFINITY);
+            let found = search.blocked(0, (square, 0), bound, refinement);
+            if found < bounds[i] {
+                *far = found;
             }
         }
     });
@@ -115,6 +117,8 @@ struct Member {
     /// About the nearest depth in the square.
     near: f32,
     own: Sums,
+    /// How it winds about the centres of the square's quarters, where they are asked about.
+    quarters: [i32; 4],
     /// Whether it covers the centre or has an edge that meets the square.
     is_met: bool,
     /// Whether its sheet covers the square.
@@ -162,8 +166,6 @@ struct Search<'a> {
     /// By piece: its member, valid where `stamps` has the current stamp.
     places: Vec<u32>,
     stamps: Vec<u32>,
-    /// By piece: the stamp of the last part of a pixel in which an edge of it was met.
-    touched: Vec<u32>,
     stamp: u32,
 }
 
@@ -178,7 +180,6 @@ impl<'a> Search<'a> {
             levels: Vec::new(),
             places: vec![0; count],
             stamps: vec![0; count],
-            touched: vec![0; count],
             stamp: 0,
         }
     }
@@ -207,7 +208,7 @@ impl<'a> Search<'a> {
                 *stamp = self.stamp;
                 // A triangle that is turned to the sense +1 winds once about what it covers.
                 let winding = if self.meeting.pieces[piece as usize].has_more {
-                    self.meeting.windings(piece, centre, 0).0
+                    self.meeting.winding(piece, centre)
                 } else {
                     winding
                 };
@@ -221,58 +222,66 @@ impl<'a> Search<'a> {
     ///
     /// `which` of the four squares of its level it is.
     /// The result is at most `bound`, which the caller knows to hold.
+    /// `is_found`: something that is as far as `bound` covers the square.
     fn blocked(
         &mut self,
         depth: usize,
         (square, which): (Square, usize),
-        bound: f32,
+        (bound, is_found): (f32, bool),
         refinement: u32,
     ) -> f32 {
         let mut level = std::mem::take(&mut self.levels[depth]);
-        self.find_members(&mut level, (square, which), bound);
-        let best = level.nearest_sheet(bound);
         // A quarter has sides of 2 units at least.
-        let best = if refinement > 0 && square.half > 1 {
-            self.by_quarters(depth, &level, square, best, (best < bound, refinement))
-        } else {
-            best
-        };
+        let splits = refinement > 0 && square.half > 1;
+        let quarters = self.find_members(&mut level, (square, which), bound, splits);
+        let alone = quarters.farthest();
+        let (bound, is_found) = (bound.min(alone), is_found || alone < bound);
+        let mut best = bound;
+        if !splits || self.is_worth_it(quarters.floor(), best, is_found) {
+            self.join_members(&mut level, square);
+            best = level.nearest_sheet(bound);
+            let is_found = is_found || best < bound;
+            if splits && self.is_worth_it(quarters.floor(), best, is_found) {
+                let so_far = (best, is_found);
+                best = self.by_quarters(depth, (&level, &quarters), square, so_far, refinement);
+            }
+        }
         self.levels[depth] = level;
         best
     }
 
-    /// Finds the members in a square, and joins those that meet at an edge in it.
-    fn find_members(&mut self, level: &mut Level, (square, which): (Square, usize), bound: f32) {
-        let Level { pieces, edges, members, met, folds, .. } = level;
+    /// Whether a square may become so much nearer than `best` that it is looked at any closer.
+    ///
+    /// Nothing is shown that is nearer than `floor`.
+    #[inline]
+    fn is_worth_it(&self, floor: f32, best: f32, is_found: bool) -> bool {
+        floor < best && (!is_found || self.beyond - best < WORTH * (self.beyond - floor))
+    }
+
+    /// Finds the members in a square that are nearer than `bound`.
+    ///
+    /// Returns what single members tell of its quarters, if it `splits`.
+    fn find_members(
+        &mut self,
+        level: &mut Level,
+        (square, which): (Square, usize),
+        bound: f32,
+        splits: bool,
+    ) -> Quarters {
+        let Level { pieces, members, .. } = level;
         members.clear();
-        met.clear();
-        folds.clear();
         self.stamp += 1;
         let fault = self.walk.placed.fault;
-        let half = f64::from(square.half + REACH);
-        let half = if is_planted!(fault, DepthAtCentre) { 0.0 } else { half };
-        let half = if is_planted!(fault, PlaneWithoutReach) { 0.0 } else { half };
-        // All that is here meets the pixel itself, but not each part of it.
-        let is_part = square.half != UNITS / 2;
-        if is_part {
-            for number in edges.iter().copied() {
-                let edge = &self.meeting.edges[number as usize];
-                if square.is_met(edge.ends, self.reach) {
-                    met.push(number);
-                    for piece in edge.pieces.into_iter().filter(|piece| *piece != NO_PIECE) {
-                        self.touched[piece as usize] = self.stamp;
-                    }
-                }
-            }
-        } else {
-            met.extend_from_slice(edges);
-        }
+        let grown = |half: i32| {
+            let points = [is_planted!(fault, DepthAtCentre), is_planted!(fault, PlaneWithoutReach)];
+            if points.contains(&true) { 0.0 } else { f64::from(half + REACH) }
+        };
+        let (half, half_of_quarter) = (grown(square.half), grown(square.half / 2));
+        let squares = square.quarters();
+        let size = (square.half / 2, square.half / 2 + self.reach);
+        let mut found = Quarters::NOTHING;
         for (piece, windings) in pieces.iter().copied() {
-            let is_touched = self.touched[piece as usize] == self.stamp;
-            if is_part && windings[which] == 0 && !is_touched {
-                continue;
-            }
-            let facet = self.meeting.pieces[piece as usize].facet;
+            let facet = &self.meeting.pieces[piece as usize].facet;
             if facet.nearest >= f64::from(bound) {
                 continue;
             }
@@ -283,19 +292,54 @@ impl<'a> Search<'a> {
                 continue;
             }
             let winding = windings[which];
+            let mut quarters = [0; 4];
+            if splits {
+                let inside;
+                (quarters, inside) = self.meeting.around(piece, square.centre, size);
+                for k in 0..4 {
+                    let [x, y] = squares[k].centre;
+                    if quarters[k] != 0 {
+                        #[expect(clippy::cast_possible_truncation, reason = "for a choice alone")]
+                        let at = facet.at_point(x, y) as f32;
+                        found.floors[k] = found.floors[k].min(at);
+                    }
+                    let is_alone = if is_planted!(fault, CentreForQuarter) {
+                        quarters[k] != 0
+                    } else {
+                        inside[k]
+                    };
+                    if is_alone {
+                        let far = Facet::rounded(facet.range(x, y, half_of_quarter).0, fault);
+                        found.alone[k] = found.alone[k].min(far);
+                    }
+                }
+            }
             let own = Sums { winding, far: Facet::rounded(far, fault), ..Sums::NOTHING };
             let parent = members.len() as u32;
             self.places[piece as usize] = parent;
             self.stamps[piece as usize] = self.stamp;
-            members.push(Member { piece, parent, near, own, is_met: winding != 0, covers: false });
+            let is_met = winding != 0;
+            members.push(Member { piece, parent, near, own, quarters, is_met, covers: false });
         }
-        met.retain(|number| {
-            let edge = &self.meeting.edges[*number as usize];
+        found
+    }
+
+    /// Joins the members that meet at an edge in a square.
+    fn join_members(&mut self, level: &mut Level, square: Square) {
+        let Level { edges, members, met, folds, .. } = level;
+        met.clear();
+        folds.clear();
+        let fault = self.walk.placed.fault;
+        // All that is here meets the pixel itself, but not each part of it.
+        let is_part = square.half != UNITS / 2;
+        for number in edges.iter().copied() {
+            let edge = &self.meeting.edges[number as usize];
             let known = |piece: u32| piece != NO_PIECE && self.stamps[piece as usize] == self.stamp;
             let is_known = edge.pieces.map(known);
-            if is_known == [false; 2] {
-                return false;
+            if is_known == [false; 2] || (is_part && !square.is_met(edge.ends, self.reach)) {
+                continue;
             }
+            met.push(number);
             let place = |k: usize| self.places[edge.pieces[k] as usize];
             if is_known == [true; 2] {
                 let both = [place(0), place(1)];
@@ -311,21 +355,20 @@ impl<'a> Search<'a> {
                 member.is_met = true;
                 member.own.is_open |= !is_planted!(fault, ContoursIgnored);
             }
-            true
-        });
+        }
     }
 
     /// The farthest of the quarters, if that is nearer than `best`, which holds for all of them.
     fn by_quarters(
         &mut self,
         depth: usize,
-        level: &Level,
+        (level, quarters): (&Level, &Quarters),
         square: Square,
-        best: f32,
-        (is_found, refinement): (bool, u32),
+        (best, is_found): (f32, bool),
+        refinement: u32,
     ) -> f32 {
-        let is_hopeful = |m: &&Member| m.is_met && m.near < best;
-        if !level.members.iter().filter(is_hopeful).any(|m| !m.covers) {
+        let hopeful = level.members.iter().filter(|m| m.is_met && m.near < best);
+        if hopeful.clone().all(|m| m.covers) {
             return best;
         }
         if self.levels.len() == depth + 1 {
@@ -333,40 +376,54 @@ impl<'a> Search<'a> {
         }
         let next = &mut self.levels[depth + 1];
         next.pieces.clear();
-        // What covers a quarter covers its centre, so nothing is shown that is nearer than this.
-        let squares = square.quarters();
-        let mut floors = [f32::INFINITY; 4];
-        for member in level.members.iter().filter(is_hopeful) {
-            let windings = self.meeting.windings(member.piece, square.centre, square.half / 2).1;
-            next.pieces.push((member.piece, windings));
-            let facet = self.meeting.pieces[member.piece as usize].facet;
-            for k in 0..4 {
-                if windings[k] != 0 {
-                    let [x, y] = squares[k].centre;
-                    #[expect(clippy::cast_possible_truncation, reason = "for a choice alone")]
-                    let at = facet.at_point(x, y) as f32;
-                    floors[k] = floors[k].min(at);
-                }
-            }
-        }
+        next.pieces.extend(hopeful.map(|m| (m.piece, m.quarters)));
+        next.edges.clone_from(&level.met);
         // The farthest comes first, since it decides.
         let mut order = [0, 1, 2, 3];
+        let Quarters { floors, alone } = quarters;
         order.sort_unstable_by(|a, b| floors[*b].total_cmp(&floors[*a]));
-        let floor = floors[order[0]];
-        let is_worth_it = self.beyond - best < WORTH * (self.beyond - floor);
-        if floor >= best || (is_found && !is_worth_it) {
-            return best;
-        }
-        next.edges.clone_from(&level.met);
+        let squares = square.quarters();
         let mut most = f32::NEG_INFINITY;
         for k in order {
-            let far = self.blocked(depth + 1, (squares[k], k), best, refinement - 1);
+            // What is nearer than the farthest quarter gains nothing.
+            let (bound, is_found) = (best.min(alone[k]), is_found || alone[k] < best);
+            let far = if bound <= most || !self.is_worth_it(floors[k], bound, is_found) {
+                bound
+            } else {
+                let quarter = (squares[k], k);
+                self.blocked(depth + 1, quarter, (bound, is_found), refinement - 1)
+            };
             if far >= best {
                 return best;
             }
             most = most.max(far);
         }
         most
+    }
+}
+
+/// What single facets tell of the quarters of a square.
+#[derive(Debug, Clone, Copy)]
+struct Quarters {
+    /// About the nearest depths at their centres.
+    ///
+    /// What covers a square or a quarter of it covers the quarter's centre.
+    /// So nothing is shown that is nearer than the farthest of them.
+    floors: [f32; 4],
+    /// Every ray through a quarter is blocked at this depth or before, by one facet that covers the
+    /// quarter as a whole.
+    alone: [f32; 4],
+}
+
+impl Quarters {
+    const NOTHING: Self = Self { floors: [f32::INFINITY; 4], alone: [f32::INFINITY; 4] };
+
+    fn floor(&self) -> f32 {
+        self.floors.into_iter().fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    fn farthest(&self) -> f32 {
+        self.alone.into_iter().fold(f32::NEG_INFINITY, f32::max)
     }
 }
 

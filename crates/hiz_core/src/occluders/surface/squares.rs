@@ -1,8 +1,8 @@
 //! The pixels that are asked about: all of some rows, or the open ones among them.
 
-use crate::occluders::surface::coverage::{EdgeFunctions, Grid, for_each_centre, for_each_met};
-use crate::occluders::surface::facets::{Corner, Facet, REACH, UNITS};
-use crate::occluders::surface::looks::{PixelBox, Tiles};
+use crate::occluders::surface::coverage::{Grid, for_each_centre, for_each_met};
+use crate::occluders::surface::facets::{Corner, REACH, UNITS};
+use crate::occluders::surface::looks::PixelBox;
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::pixel_bits::PixelBits;
 
@@ -26,7 +26,6 @@ pub(super) struct Squares<'a> {
 enum Kind<'a> {
     Left {
         left: &'a PixelBits,
-        tiles: &'a Tiles,
     },
     Open {
         open: &'a OpenPixels,
@@ -37,8 +36,8 @@ enum Kind<'a> {
 
 impl<'a> Squares<'a> {
     /// All pixels from the first to the last row, of which some are `left`.
-    pub(super) fn left(grid: Grid, left: &'a PixelBits, tiles: &'a Tiles) -> Self {
-        Self { grid, kind: Kind::Left { left, tiles } }
+    pub(super) fn left(grid: Grid, left: &'a PixelBits) -> Self {
+        Self { grid, kind: Kind::Left { left } }
     }
 
     /// The open pixels from the first to the last row.
@@ -62,7 +61,7 @@ impl<'a> Squares<'a> {
         let (rows, within) = (around.rows(), self.grid.rows);
         let rows = [rows[0].max(within[0]), rows[1].min(within[1])];
         match self.kind {
-            Kind::Left { left, .. } => left.any(around.columns(), rows),
+            Kind::Left { left } => left.any(around.columns(), rows),
             Kind::Open { open, .. } => open.any(around.columns(), rows),
         }
     }
@@ -77,7 +76,7 @@ impl<'a> Squares<'a> {
         }
         let (columns, rows) = self.grid.around(x, y);
         match self.kind {
-            Kind::Left { left, .. } => left.any(columns, rows),
+            Kind::Left { left } => left.any(columns, rows),
             Kind::Open { open, .. } => open.any(columns, rows),
         }
     }
@@ -89,23 +88,20 @@ impl<'a> Squares<'a> {
         (line + x) as usize
     }
 
-    /// Calls `cover` for the pixels whose centres a triangle of `facet` covers.
+    /// Calls `cover` for the pixels whose centres a triangle covers.
     ///
-    /// Pixels are left out where `is_wanted` is false of their numbers, and may be if it is beyond
-    /// every threshold.
+    /// Pixels are left out where `is_wanted` is false of their numbers.
     #[inline]
     pub(super) fn for_each_covered(
         &self,
-        facet: &Facet,
         corners: [Corner; 3],
         is_wanted: impl Fn(usize) -> bool,
         mut cover: impl FnMut(Place),
     ) {
         match self.kind {
-            Kind::Left { left, tiles } => {
-                let is_hidden =
-                    |x, y| !left.any_of_eight(x, y) || facet.nearest > f64::from(tiles.last(x, y));
-                for_each_centre(corners, self.grid, is_hidden, |x, y| {
+            Kind::Left { left } => {
+                let wanted = |y, columns| left.of_row(y, columns);
+                for_each_centre(corners, self.grid, wanted, |x, y| {
                     let number = self.number(x, y);
                     if is_wanted(number) {
                         cover(self.place(x, y, number));
@@ -113,24 +109,13 @@ impl<'a> Squares<'a> {
                 });
             }
             Kind::Open { open, first } => {
-                let [a, b, c] = corners;
-                let (columns, rows) = self.grid.around(
-                    [a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x)],
-                    [a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y)],
-                );
-                let functions = EdgeFunctions::new(corners);
-                for y in rows[0]..=rows[1] {
-                    let mut of_row = open.of_row(y, columns).peekable();
-                    let Some((_, begin)) = of_row.peek().copied() else { continue };
-                    let row = functions.at(self.grid.centre(begin), self.grid.centre(y));
-                    for (number, x) in of_row {
-                        let place = self.place(x, y, number - first);
-                        let right = i64::from((x - begin) * UNITS);
-                        if functions.covers(row, right) && is_wanted(place.number) {
-                            cover(place);
-                        }
+                let wanted = |y, columns| open.of_row(y, columns).map(|(_, x)| x);
+                for_each_centre(corners, self.grid, wanted, |x, y| {
+                    let number = open.number(x, y) - first;
+                    if is_wanted(number) {
+                        cover(self.place(x, y, number));
                     }
-                }
+                });
             }
         }
     }
@@ -139,9 +124,9 @@ impl<'a> Squares<'a> {
     #[inline]
     pub(super) fn for_each_met(&self, edge: [Corner; 2], reach: i32, mut meet: impl FnMut(Place)) {
         match self.kind {
-            Kind::Left { .. } => {
-                let all = |_, [first, last]: [i32; 2]| first..=last;
-                for_each_met(edge, reach, self.grid, all, |x, y| {
+            Kind::Left { left } => {
+                let wanted = |y, columns| left.of_row(y, columns);
+                for_each_met(edge, reach, self.grid, wanted, |x, y| {
                     meet(self.place(x, y, self.number(x, y)));
                 });
             }

@@ -29,8 +29,7 @@ const BEYOND: f32 = 0.3;
 const PER_PIXEL: u64 = 4;
 /// A little farther than a depth that float32 rounded.
 const HAIR: f32 = 1.0 - 1e-5;
-/// How much farther than all neighbours a search looks at first, and then.
-const LIKELY: f32 = 0.9;
+/// How much farther than all neighbours a search looks.
 const ROOM: f32 = 0.5;
 /// The room of slabs towards near.
 const NEARER: f32 = 1.03;
@@ -98,19 +97,13 @@ impl Centres<'_> {
         (slabs, tiles)
     }
 
-    /// What comes after the first value seldom covers an open pixel, and nearly never what comes
-    /// after the second one.
-    pub(super) fn bounds(&self, pixel: u32, slabs: &Slabs) -> [f32; 2] {
+    /// What comes after this nearly never covers an open pixel.
+    pub(super) fn bound(&self, pixel: u32, slabs: &Slabs) -> f32 {
         let (x, y) = (pixel % self.size.width, pixel / self.size.width);
-        let lines = self.lines(y as usize);
-        let nine = self.nine(lines, x as usize);
-        let there = nine.into_iter().filter(|near| *near > 0.0);
-        let farthest = |room: f32| {
-            let least = there.clone().fold(f32::INFINITY, f32::min);
-            self.far(room * least).max(slabs.last())
-        };
-        let sees_nothing = nine.iter().any(|near| *near <= 0.0);
-        [farthest(LIKELY), if sees_nothing { f32::INFINITY } else { farthest(ROOM) }]
+        let nine = self.nine(self.lines(y as usize), x as usize);
+        let least = nine.into_iter().fold(f32::INFINITY, f32::min);
+        // A neighbour sees nothing, so anything may be there.
+        if least <= 0.0 { f32::INFINITY } else { self.far(ROOM * least).max(slabs.last()) }
     }
 
     /// With more for nearer, and 0 at the far plane.

@@ -73,9 +73,9 @@ impl<'a> Walk<'a> {
                     polygon.cuts().for_each(|ends| visitor.border(ends, one, Met::NOTHING, false));
                 }
             }
-            let has_links = self.links.has_any(look.copy);
+            let (has_links, beyond) = (self.links.has_any(look.copy), look.beyond(near));
             for edge in self.placed.topology.edges(look.meshlet) {
-                if look.is_beyond(edge, near) {
+                if beyond >> (edge.triangle & 127) & 1 != 0 {
                     debug_assert!(
                         is_planted!(self.placed.fault, BoxesTooSmall)
                             || look.inside(edge).is_some_and(|ends| !visitor.wants(&ends))
@@ -113,7 +113,7 @@ impl<'a> Walk<'a> {
                 } else if let Some(its) = self.looks.find(look.copy, neighbour.meshlet) {
                     other = self.met(its, &self.looks.all[its as usize], neighbour.triangle);
                     // That meshlet has the edge in its list, too.
-                    if its < place && other.is_there() {
+                    if other.is_there() && (its < place || !one.is_there()) {
                         return;
                     }
                 }
