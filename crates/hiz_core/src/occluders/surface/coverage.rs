@@ -209,8 +209,8 @@ pub(super) fn for_each_centre<Columns: Iterator<Item = i32>>(
                 cover(x, y);
             }
         }
-        for k in 0..3 {
-            value[k] += functions.down[k];
+        for (value, down) in value.iter_mut().zip(functions.down) {
+            *value += down;
         }
     }
 }
