@@ -138,7 +138,7 @@ impl Case {
     fn plain(&self) -> Vec<f32> {
         let surface = OccluderSurface::from_meshes(&self.meshes(), &self.drawing).unwrap();
         let size = self.camera.size();
-        let mut raster = HostRaster::new(size, 1);
+        let mut raster = HostRaster::new(size, [1, 1]);
         raster.draw(&surface, &self.camera, 1, false).unwrap();
         let mut depth = vec![f32::NAN; size.pixels() as usize];
         raster.write(&mut depth, &self.camera, 1);

@@ -56,12 +56,12 @@ impl Mesh {
 /// How an image is drawn; none of it may change a pixel.
 #[derive(Debug, Clone, Copy)]
 struct Way {
-    bands: usize,
+    grid: [usize; 2],
     threads: usize,
     skip: bool,
 }
 
-const PLAIN: Way = Way { bands: 1, threads: 1, skip: false };
+const PLAIN: Way = Way { grid: [1, 1], threads: 1, skip: false };
 
 fn draw(
     surface: &OccluderSurface,
@@ -70,7 +70,7 @@ fn draw(
     fault: Option<RasterFault>,
 ) -> Vec<f32> {
     let size = camera.size();
-    let mut raster = HostRaster::with_fault(size, way.bands, fault);
+    let mut raster = HostRaster::with_fault(size, way.grid, fault);
     raster.draw(surface, camera, way.threads, way.skip).unwrap();
     let mut depth = vec![f32::NAN; size.pixels() as usize];
     raster.write(&mut depth, camera, way.threads);
@@ -330,10 +330,16 @@ fn in_other_ways(seeds: std::ops::Range<u64>, fault: Option<RasterFault>) -> Res
             let pixels = plain.iter().zip(depth).filter(|pair| differs(*pair)).count();
             if pixels == 0 { Ok(()) } else { Err(format!("seed {seed}, {how}: {pixels} pixels")) }
         };
-        for (bands, threads, skip) in
-            [(1, 1, true), (2, 1, true), (3, 2, false), (7, 4, true), (1000, 2, true)]
-        {
-            let way = Way { bands, threads, skip };
+        for (grid, threads, skip) in [
+            ([1, 1], 1, true),
+            ([1, 2], 1, true),
+            ([2, 1], 1, true),
+            ([3, 3], 2, false),
+            ([5, 2], 4, true),
+            ([1, 7], 4, true),
+            ([1000, 1000], 2, true),
+        ] {
+            let way = Way { grid, threads, skip };
             check(&draw(&surface, camera, way, fault), &format!("{way:?}"))?;
         }
         let mut shuffled = mesh.clone();
@@ -516,7 +522,7 @@ fn each_centre_of_a_net_is_covered_once() {
 }
 
 #[test]
-fn bands_threads_order_and_skipping_change_no_bit() {
+fn panes_threads_order_and_skipping_change_no_bit() {
     in_other_ways(0..60, None).unwrap();
 }
 
@@ -565,7 +571,7 @@ fn any_accepted_position_is_safe() {
         let surface = mesh.surface(view.seen.culled, None);
         let plain = draw(&surface, &view.seen.camera, PLAIN, None);
         assert!(plain.iter().all(|depth| (0.0..=1.0).contains(depth)), "seed {seed}");
-        let way = Way { bands: 3, threads: 1, skip: true };
+        let way = Way { grid: [2, 3], threads: 1, skip: true };
         assert_eq!(plain, draw(&surface, &view.seen.camera, way, None), "seed {seed}");
     }
 }
@@ -602,6 +608,8 @@ fn planted_faults_are_seen() {
         RasterFault::MasksShifted,
         RasterFault::OrderOfOnePixel,
         RasterFault::LayersOverlap,
+        RasterFault::WayByPane,
+        RasterFault::PanesShifted,
         RasterFault::MirrorsIgnored,
     ];
     let unseen: Vec<RasterFault> = faults

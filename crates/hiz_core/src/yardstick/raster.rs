@@ -4,8 +4,9 @@ use crate::error::Result;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::occluders::drawing::DrawOptions;
+use crate::occluders::host_raster::planted_fault::Planted;
 #[cfg(feature = "testing")]
-use crate::occluders::host_raster::planted_fault::{Planted, RasterFault};
+use crate::occluders::host_raster::planted_fault::RasterFault;
 use crate::occluders::host_raster::{self, Way};
 use crate::occluders::surface::OccluderSurface;
 
@@ -17,20 +18,21 @@ pub struct HostRaster {
 }
 
 impl HostRaster {
-    /// An image in `bands` bands of rows; a thread draws whole bands.
-    pub fn new(size: ImageSize, bands: usize) -> Self {
-        Self { raster: host_raster::HostRaster::new(size, bands), size }
+    /// An image of about so many columns and rows of panes; a thread draws whole panes.
+    pub fn new(size: ImageSize, grid: [usize; 2]) -> Self {
+        let raster = host_raster::HostRaster::with_fault(size, grid, Planted::default());
+        Self { raster, size }
     }
 
-    /// An image in as many bands as drawings on so many threads have outside of this module.
+    /// An image in the panes that drawings on so many threads have outside of this module.
     pub fn for_threads(size: ImageSize, threads: usize) -> Self {
         Self { raster: host_raster::HostRaster::for_threads(size, threads), size }
     }
 
     /// An image like [`HostRaster::new`], whose rasteriser has a planted fault.
     #[cfg(feature = "testing")]
-    pub fn with_fault(size: ImageSize, bands: usize, fault: Option<RasterFault>) -> Self {
-        Self { raster: host_raster::HostRaster::with_fault(size, bands, Planted(fault)), size }
+    pub fn with_fault(size: ImageSize, grid: [usize; 2], fault: Option<RasterFault>) -> Self {
+        Self { raster: host_raster::HostRaster::with_fault(size, grid, Planted(fault)), size }
     }
 
     /// Clears the image and draws `surface` as `camera` sees it.

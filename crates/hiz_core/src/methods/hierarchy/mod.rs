@@ -286,7 +286,7 @@ impl HierarchicalVisibility {
         kept.get_or_insert_with(|| Images {
             image: OneByOne::new(size),
             pyramid: ZPyramid::new(size, self.fault),
-            flat: HostRaster::new(size, 1),
+            flat: HostRaster::new(size),
         })
     }
 

@@ -17,7 +17,7 @@ pub struct DepthTiles {
 impl DepthTiles {
     /// An empty image.
     pub fn new(size: ImageSize) -> Self {
-        Self { raster: HostRaster::new(size, 1), size }
+        Self { raster: HostRaster::new(size), size }
     }
 
     /// Clears the image and draws all triangles, without those that are hidden.

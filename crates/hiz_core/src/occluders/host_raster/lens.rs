@@ -77,9 +77,14 @@ impl Image {
         Self { width: size.width as i32, height: size.height as i32, half, guard, fault }
     }
 
+    /// Its first and its last column, and its first and its last row.
+    pub(super) fn pixels(&self) -> [(i32, i32); 2] {
+        [(0, self.width - 1), (0, self.height - 1)]
+    }
+
     /// Columns or rows `low..=high` whose centres lie between two positions from the middle.
     #[inline(always)]
-    pub(super) fn pixels(half: i32, side: i32, from: f32, to: f32) -> (i32, i32) {
+    pub(super) fn pixels_between(half: i32, side: i32, from: f32, to: f32) -> (i32, i32) {
         let clamped = |v: f32| rounded(greatest(least(v, FARTHEST_UNIT), -FARTHEST_UNIT)) + half;
         ((clamped(from) >> 8).clamp(0, side - 1), (clamped(to) >> 8).clamp(0, side - 1))
     }
@@ -267,8 +272,8 @@ pub(super) fn extent_within(
     let nearest = if is_planted!(image.fault, BoxesByTheirFarthest) { farthest } else { nearest };
     Some(Extent {
         nearest: greatest(nearest, 0.0) * NEAR_MARGIN,
-        columns: Image::pixels(image.half[0], image.width, left - spare, right + spare),
-        rows: Image::pixels(image.half[1], image.height, top - spare, bottom + spare),
+        columns: Image::pixels_between(image.half[0], image.width, left - spare, right + spare),
+        rows: Image::pixels_between(image.half[1], image.height, top - spare, bottom + spare),
     })
 }
 

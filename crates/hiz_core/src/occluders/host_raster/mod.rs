@@ -5,7 +5,7 @@
 //! This one draws depth alone, and looks first at what it need not draw:
 //!
 //! 1. `lens`: the box of each meshlet against the view; the rest is sorted front to back.
-//! 2. `band`: a meshlet whose box is behind all that was drawn where it would show is skipped
+//! 2. `pane`: a meshlet whose box is behind all that was drawn where it would show is skipped
 //!    (Greene, Kass and Miller 1993; Greene 1996).
 //!    The farthest depths of tiles tell this, and pixels where tiles cannot.
 //! 3. `vertices`: positions in the image, and the triangles that may cover a pixel's centre.
@@ -13,6 +13,7 @@
 //!    `edges` follows them from pixel to pixel and from tile to tile.
 //! 5. `tile`: 8x8 pixels as planes with coverage masks, or as pixels.
 //!    `tiles` compares eight of them with a triangle at once.
+//! 6. `panes`: the parts of the image, each of which one thread draws.
 //!
 //! **What it promises.**
 //! A pixel holds the nearest depth of the triangles that cover its centre.
@@ -24,7 +25,7 @@
 //! Nothing is drawn before the near plane or beyond the far plane.
 //! Triangles across the near plane or far outside of the image are clipped in float64; a cut whose
 //! w is below 2^-33 of its triangle's size has no certain place and is left out.
-//! Skipping, the number of bands and the number of threads change no pixel.
+//! Skipping, the number of panes and the number of threads change no pixel.
 //! Without fused multiply-add, which Rust does not use by itself, every machine makes the same
 //! bits.
 //!
@@ -34,12 +35,13 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes read several arrays at once")]
 
-mod band;
 mod edges;
 mod lanes;
 mod lens;
 #[cfg(feature = "methods")]
 pub(crate) mod one_by_one;
+mod pane;
+mod panes;
 pub(crate) mod planted_fault;
 #[cfg(feature = "methods")]
 pub(crate) mod snapped;
@@ -47,6 +49,7 @@ mod tile;
 mod tiles;
 mod triangle;
 mod vertices;
+mod written;
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -59,13 +62,14 @@ use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
 use crate::occluders::drawing::{DrawOptions, Last, Ranked, Touched, both};
-use crate::occluders::host_raster::band::Band;
 use crate::occluders::host_raster::lanes::three;
 use crate::occluders::host_raster::lens::{Extent, Image, Lens, extent};
+use crate::occluders::host_raster::pane::Pane;
+use crate::occluders::host_raster::panes::{Grid, Panes, grid_for};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
-use crate::occluders::host_raster::tile::SIDE;
 use crate::occluders::host_raster::triangle::{End, Triangle, clipped};
 use crate::occluders::host_raster::vertices::Vertices;
+use crate::occluders::host_raster::written::write;
 use crate::occluders::meshlets::{LANES, Meshlet, PART_GROUPS};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
@@ -75,7 +79,7 @@ use crate::occluders::view::View;
 #[derive(Debug)]
 pub(crate) struct HostRaster {
     image: Image,
-    bands: Vec<Band>,
+    panes: Panes,
 }
 
 /// What is drawn, and how it is seen.
@@ -155,41 +159,32 @@ impl Told {
 }
 
 impl HostRaster {
-    /// An empty image, in `bands` bands.
-    pub(crate) fn new(size: ImageSize, bands: usize) -> Self {
-        Self::with_fault(size, bands, Planted::default())
+    /// An empty image of one pane.
+    #[cfg(feature = "methods")]
+    pub(crate) fn new(size: ImageSize) -> Self {
+        Self::for_threads(size, 1)
     }
 
     /// An empty image for drawing with so many threads.
     pub(crate) fn for_threads(size: ImageSize, threads: usize) -> Self {
-        /// Parts of unequal work even out, and a meshlet on a border is projected twice.
-        const BANDS_A_THREAD: usize = 4;
-        /// Rows of tiles: thinner bands have more borders than they gain.
-        const LEAST_ROWS: usize = 8;
-        let rows = (size.height as usize).div_ceil(SIDE);
-        let bands = (BANDS_A_THREAD * threads).min(rows / LEAST_ROWS).max(threads);
-        Self::new(size, if threads > 1 { bands } else { 1 })
+        Self::with_fault(size, grid_for(size, threads), Planted::default())
     }
 
-    /// [`HostRaster::new`] with a planted fault, for tests.
-    pub(crate) fn with_fault(size: ImageSize, bands: usize, fault: Planted) -> Self {
+    /// An empty image of about so many columns and rows of panes, with a planted fault for tests.
+    pub(crate) fn with_fault(size: ImageSize, grid: Grid, fault: Planted) -> Self {
         let image = Image::of_size(size, fault);
-        let rows = (image.height as usize).div_ceil(SIDE);
-        let bands = bands.clamp(1, rows);
-        let edge = |k: usize| (rows * k / bands * SIDE) as i32;
-        let bands = (0..bands).map(|k| Band::new(image, edge(k), edge(k + 1))).collect();
-        Self { image, bands }
+        Self { image, panes: Panes::new(image, grid) }
     }
 
     /// Makes the image far everywhere.
     pub(crate) fn clear(&mut self) {
-        self.bands.iter_mut().for_each(Band::clear);
+        self.panes.iter_mut().for_each(Pane::clear);
     }
 
     /// Bytes of the image.
     #[cfg(feature = "methods")]
     pub(crate) fn bytes(&self) -> u64 {
-        self.bands.iter().map(Band::bytes).sum()
+        self.panes.bytes()
     }
 
     /// Draws the copies of a scene, within the limits of `options`.
@@ -218,20 +213,20 @@ impl HostRaster {
         let faces = scene.cull_mode.as_seen_by(scene.camera);
         let drawn: Vec<AtomicBool> = candidates.iter().map(|_| AtomicBool::new(false)).collect();
         let threads = way.threads.unwrap_or_else(|| worth_it(self.drawing_ns(&candidates)));
-        on_threads(threads, &mut self.bands, |band: &mut Band| {
+        on_threads(threads, self.panes.by_work(&candidates), |pane| {
             let mut vertices = Vertices::new();
             for (candidate, drawn) in candidates.iter().zip(&drawn) {
                 let Candidate { extent, .. } = candidate;
-                if extent.rows.1 < band.top || extent.rows.0 >= band.bottom {
+                if !pane.meets(extent) {
                     continue;
                 }
-                if way.skip && band.hides(extent) {
+                if way.skip && pane.hides(extent) {
                     continue;
                 }
                 drawn.store(true, Ordering::Relaxed);
                 let lens = &lenses[candidate.lens as usize];
-                draw_meshlet(scene.shapes, candidate, lens, faces, &image, band, &mut vertices);
-                band.renew();
+                draw_meshlet(scene.shapes, candidate, lens, faces, &image, pane, &mut vertices);
+                pane.renew();
             }
         });
         let mut all = Drawn::default();
@@ -253,8 +248,8 @@ impl HostRaster {
     fn drawing_ns(&self, candidates: &[Candidate]) -> u64 {
         let groups: u32 = candidates.iter().map(|c| c.groups.1 - c.groups.0).sum();
         let triangles = LANES * groups as usize;
-        // Many of the triangles are skipped, and most pixels are drawn once.
-        10 * triangles as u64 + self.image.width as u64 * self.image.height as u64
+        // Of the triangles many are skipped, and others are large.
+        30 * triangles as u64 + self.image.width as u64 * self.image.height as u64 / 3
     }
 
     /// About how long one thread takes to write some rows, in nanoseconds.
@@ -353,15 +348,17 @@ impl HostRaster {
         let pitch = self.image.width as usize * size_of::<f32>();
         let mut rest: &mut [u8] = bytemuck::cast_slice_mut(out);
         let parts: Vec<_> = self
-            .parts(&(0..self.image.height as u32))
-            .map(|(band, rows)| {
+            .panes
+            .in_rows(&(0..self.image.height as u32))
+            .map(|(panes, rows)| {
                 let (part, behind) = std::mem::take(&mut rest).split_at_mut(rows.len() * pitch);
                 rest = behind;
-                (band, rows, part)
+                (panes, rows, part)
             })
             .collect();
-        on_threads(threads, parts, |(band, rows, part)| {
-            band.write(wgpu::WriteOnly::from_mut(part), pitch, rows, convention);
+        on_threads(threads, parts, |(panes, rows, part)| {
+            let out = wgpu::WriteOnly::from_mut(part);
+            write(&self.image, panes, out, pitch, rows, convention);
         });
     }
 
@@ -382,25 +379,18 @@ impl HostRaster {
     ) -> Result<()> {
         let threads = worth_it(self.writing_ns(rows.len() as u64));
         let failed = Locked::new(None);
-        let parts: Vec<_> = self.parts(rows).collect();
-        on_threads(threads, parts, |(band, part)| {
+        let parts: Vec<_> = self.panes.in_rows(rows).collect();
+        on_threads(threads, parts, |(panes, part)| {
             let byte = |row: i32| ((row - rows.start as i32) as usize * pitch) as u64;
             match open(byte(part.start)..byte(part.end)) {
-                Ok(mut view) => band.write(view.slice(..), pitch, part, convention),
+                Ok(mut view) => {
+                    write(&self.image, panes, view.slice(..), pitch, part, convention);
+                }
                 Err(error) => *failed.lock() = Some(error),
             }
         });
         let failed = failed.lock().take();
         failed.map_or(Ok(()), Err)
-    }
-
-    /// The bands that some rows lie in, and which of the rows.
-    fn parts(&self, rows: &Range<u32>) -> impl Iterator<Item = (&Band, Range<i32>)> {
-        let (first, end) = (rows.start as i32, rows.end as i32);
-        self.bands
-            .iter()
-            .map(move |band| (band, band.top.max(first)..band.bottom.min(end)))
-            .filter(|(_, rows)| !rows.is_empty())
     }
 }
 
@@ -438,14 +428,14 @@ fn draw_meshlet(
     lens: &Lens,
     faces: FaceCull,
     image: &Image,
-    band: &mut Band,
+    pane: &mut Pane,
     vertices: &mut Vertices,
 ) {
-    let rows = (band.top, band.bottom.min(image.height) - 1);
-    triangles_of(shapes, candidate, lens, faces, image, rows, vertices, |t| band.draw(t));
+    let pixels = pane.pixels();
+    triangles_of(shapes, candidate, lens, faces, image, pixels, vertices, |t| pane.draw(t));
 }
 
-/// Hands out the triangles of a meshlet that may cover a centre in rows `rows.0..=rows.1`.
+/// Hands out the triangles of a meshlet that may cover a centre in these columns and rows.
 #[expect(clippy::too_many_arguments, reason = "what one loop over triangles needs")]
 #[inline(always)]
 fn triangles_of(
@@ -454,7 +444,7 @@ fn triangles_of(
     lens: &Lens,
     faces: FaceCull,
     image: &Image,
-    rows: (i32, i32),
+    pixels: [(i32, i32); 2],
     vertices: &mut Vertices,
     mut out: impl FnMut(&Triangle),
 ) {
@@ -463,7 +453,7 @@ fn triangles_of(
     let faces = if mirrored { faces.reversed() } else { faces };
     vertices.project(&shapes.blocks, meshlet, lens, image);
     let groups = candidate.groups.0..candidate.groups.1;
-    vertices.select(&shapes.blocks, meshlet, groups, faces, image, rows);
+    vertices.select(&shapes.blocks, meshlet, groups, faces, image, pixels);
     if candidate.extent.pixels() > SORTED_FROM * vertices.num_kept() as i64 {
         vertices.sort(&shapes.blocks, meshlet);
     }

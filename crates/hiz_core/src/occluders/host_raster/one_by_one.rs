@@ -2,7 +2,7 @@
 //!
 //! [`HostRaster`](super::HostRaster) draws a list in one go.
 //! A hierarchy decides after each meshlet what comes next, and asks for pixels in between.
-//! Both draw the same triangles into the same kind of [`Band`].
+//! Both draw the same triangles into the same kind of [`Pane`].
 
 use crate::error::Result;
 use crate::host::linear::{Vec3, inverse3};
@@ -10,13 +10,14 @@ use crate::host::memory;
 use crate::host::vectors::Plain;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
-use crate::occluders::host_raster::band::Band;
 use crate::occluders::host_raster::edges::Edges;
 use crate::occluders::host_raster::lens::{HALF, Image, Lens, extent, extent_within};
+use crate::occluders::host_raster::pane::Pane;
 use crate::occluders::host_raster::planted_fault::Planted;
 use crate::occluders::host_raster::tile::SIDE;
 use crate::occluders::host_raster::triangle::Triangle;
 use crate::occluders::host_raster::vertices::Vertices;
+use crate::occluders::host_raster::written::write;
 use crate::occluders::host_raster::{Candidate, Scene, triangles_of};
 use crate::occluders::placement::{Placement, box_corner};
 use crate::occluders::view::View;
@@ -89,7 +90,7 @@ fn stretch(linear: &[Vec3; 3]) -> f32 {
 /// An image that is drawn meshlet by meshlet.
 pub(crate) struct OneByOne {
     image: Image,
-    band: Band,
+    pane: Pane,
     vertices: Vertices,
     met: Met,
 }
@@ -184,13 +185,12 @@ impl OneByOne {
     /// An image that is far everywhere.
     pub(crate) fn new(size: ImageSize) -> Self {
         let image = Image::of_size(size, Planted::default());
-        let bottom = (image.height as usize).next_multiple_of(SIDE) as i32;
-        let band = Band::new(image, 0, bottom);
-        Self { image, band, vertices: Vertices::new(), met: Met::new(&image) }
+        let pane = Pane::of_image(image);
+        Self { image, pane, vertices: Vertices::new(), met: Met::new(&image) }
     }
 
     pub(crate) fn clear(&mut self) {
-        self.band.clear();
+        self.pane.clear();
     }
 
     /// What may show of a box in the world; `None` if it is surely outside of the view.
@@ -217,14 +217,14 @@ impl OneByOne {
 
     /// Draws a meshlet of a copy, of which `extent` may show.
     pub(crate) fn draw(&mut self, looks: &mut Looks<'_>, item: (u32, u32), extent: &Extent) {
-        let rows = (0, self.image.height - 1);
-        let Self { image, band, vertices, met } = self;
+        let pixels = self.image.pixels();
+        let Self { image, pane, vertices, met } = self;
         met.clear();
-        each_triangle(looks, item, extent, image, rows, vertices, |triangle| {
+        each_triangle(looks, item, extent, image, pixels, vertices, |triangle| {
             met.add(triangle, image);
-            band.draw(triangle);
+            pane.draw(triangle);
         });
-        band.renew();
+        pane.renew();
     }
 
     /// Columns and rows of the tiles that the last meshlet may have changed, and the nearest depth
@@ -235,7 +235,7 @@ impl OneByOne {
 
     /// The farthest depth of a tile, where it is known without looking at its pixels.
     pub(crate) fn known_farthest(&self, column: u32, row: u32) -> Option<f32> {
-        self.band.exact_farthest(column as usize, row as usize)
+        self.pane.exact_farthest(column as usize, row as usize)
     }
 
     /// How many pixels' centres the triangles of a meshlet cover, each triangle by itself.
@@ -245,10 +245,10 @@ impl OneByOne {
         item: (u32, u32),
         extent: &Extent,
     ) -> u64 {
-        let rows = (0, self.image.height - 1);
+        let pixels = self.image.pixels();
         let Self { image, vertices, .. } = self;
         let mut sum = 0;
-        each_triangle(looks, item, extent, image, rows, vertices, |triangle| {
+        each_triangle(looks, item, extent, image, pixels, vertices, |triangle| {
             sum += covered(triangle, image);
         });
         sum
@@ -256,14 +256,15 @@ impl OneByOne {
 
     /// Nearness in row `y` of a tile; columns past the image's edge hold anything.
     pub(crate) fn row_of_tile(&self, column: u32, row: u32, y: u32) -> [f32; SIDE] {
-        self.band.row_of_tile(column as usize, row as usize, y as usize)
+        self.pane.row_of_tile(column as usize, row as usize, y as usize)
     }
 
     /// Writes the image as NDC depth, row 0 on top.
     pub(crate) fn write(&self, out: &mut [f32], convention: DepthConvention) {
         let pitch = self.image.width as usize * size_of::<f32>();
         let bytes = wgpu::WriteOnly::from_mut(bytemuck::cast_slice_mut(out));
-        self.band.write(bytes, pitch, 0..self.image.height, convention);
+        let panes = std::slice::from_ref(&self.pane);
+        write(&self.image, panes, bytes, pitch, 0..self.image.height, convention);
     }
 }
 
@@ -272,7 +273,7 @@ fn each_triangle(
     (copy, meshlet): (u32, u32),
     extent: &Extent,
     image: &Image,
-    rows: (i32, i32),
+    pixels: [(i32, i32); 2],
     vertices: &mut Vertices,
     out: impl FnMut(&Triangle),
 ) {
@@ -281,7 +282,7 @@ fn each_triangle(
     let candidate =
         Candidate { copy, meshlet, groups: (groups.start, groups.end), lens: 0, extent: *extent };
     let lens = looks.lens(copy, image);
-    triangles_of(shapes, &candidate, lens, faces, image, rows, vertices, out);
+    triangles_of(shapes, &candidate, lens, faces, image, pixels, vertices, out);
 }
 
 /// First and last column and row of the centres between a triangle's extremes.

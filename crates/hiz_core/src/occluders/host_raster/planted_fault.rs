@@ -64,6 +64,10 @@ pub enum RasterFault {
     OrderOfOnePixel,
     /// A layer that is partly hidden keeps its whole mask.
     LayersOverlap,
+    /// The way in which a triangle is drawn is chosen by its columns in a pane.
+    WayByPane,
+    /// Panes are written one tile too far to the left.
+    PanesShifted,
     /// Mirrored copies keep their winding.
     MirrorsIgnored,
 }

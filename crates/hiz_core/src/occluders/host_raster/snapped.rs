@@ -69,8 +69,8 @@ impl<'a> Grid<'a> {
         let meshlet = &shapes.meshlets[meshlet as usize];
         let vertices = &mut *self.vertices;
         vertices.project(&shapes.blocks, meshlet, lens, image);
-        let (groups, rows) = (meshlet.groups(), (0, image.height - 1));
-        vertices.select(&shapes.blocks, meshlet, groups, faces, image, rows);
+        let (groups, pixels) = (meshlet.groups(), image.pixels());
+        vertices.select(&shapes.blocks, meshlet, groups, faces, image, pixels);
         for i in 0..vertices.num_kept() {
             let corners = vertices.corners(&shapes.blocks, meshlet, i);
             let projected = three(|k| vertices.projected(corners[k]));

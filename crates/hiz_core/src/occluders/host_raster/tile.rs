@@ -132,7 +132,7 @@ pub(super) const CLEAR: State = 0;
 /// The tile has pixels.
 pub(super) const PIXELS: State = MOST_LAYERS as State + 1;
 /// From here on, one plane in front of everything else covers the tile.
-/// What is added is the number of its [`Rise`] in the band.
+/// What is added is the number of its [`Rise`] in the pane.
 pub(super) const FULL: State = PIXELS + 1;
 
 /// A tile with everything that belongs to it.
@@ -148,7 +148,7 @@ pub(super) struct Tile<'a> {
 
 /// The pixels of a tile.
 pub(super) struct Pixels<'a> {
-    /// The band's pixels from the tile's first one on, and how many there are in a row.
+    /// The pane's pixels from the tile's first one on, and how many there are in a row.
     pub(super) from_first: &'a mut [f32],
     pub(super) stride: usize,
 }

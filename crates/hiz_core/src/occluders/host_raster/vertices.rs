@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use crate::host::vectors::widest;
 use crate::input::mesh::FaceCull;
 use crate::occluders::host_raster::lanes::{greatest, lanes, least, three};
 use crate::occluders::host_raster::lens::{HALF, Image, LEAST_W, Lens, rounded};
@@ -44,7 +45,6 @@ impl Vertices {
     }
 
     /// Projects the vertices of `meshlet`.
-    #[inline(never)]
     pub(super) fn project(
         &mut self,
         blocks: &Blocks,
@@ -52,6 +52,14 @@ impl Vertices {
         lens: &Lens,
         image: &Image,
     ) {
+        widest(
+            #[inline(always)]
+            || self.project_groups(blocks, meshlet, lens, image),
+        );
+    }
+
+    #[inline(always)]
+    fn project_groups(&mut self, blocks: &Blocks, meshlet: &Meshlet, lens: &Lens, image: &Image) {
         let groups = (meshlet.num_vertices as usize).div_ceil(LANES);
         let first = meshlet.first_vertex as usize;
         let high: [&[[f32; LANES]]; 3] =
@@ -113,8 +121,8 @@ impl Vertices {
         }
     }
 
-    /// Finds the triangles in `groups` of `meshlet` that may cover a centre in rows `top..=bottom`.
-    #[inline(never)]
+    /// Finds the triangles in `groups` of `meshlet` that may cover a centre in these columns and rows, from
+    /// the first to the last.
     pub(super) fn select(
         &mut self,
         blocks: &Blocks,
@@ -122,7 +130,23 @@ impl Vertices {
         groups: Range<u32>,
         culled: FaceCull,
         image: &Image,
-        (top, bottom): (i32, i32),
+        pixels: [(i32, i32); 2],
+    ) {
+        widest(
+            #[inline(always)]
+            || self.select_among(blocks, meshlet, groups, culled, image, pixels),
+        );
+    }
+
+    #[inline(always)]
+    fn select_among(
+        &mut self,
+        blocks: &Blocks,
+        meshlet: &Meshlet,
+        groups: Range<u32>,
+        culled: FaceCull,
+        image: &Image,
+        [(left, right), (top, bottom)]: [(i32, i32); 2],
     ) {
         let count = meshlet.triangles.len();
         let corners = &blocks.corners[meshlet.first_group as usize..];
@@ -146,19 +170,17 @@ impl Vertices {
             for i in 0..LANES {
                 let outside = (c0[i] & c1[i] & c2[i]) & !CLIP;
                 let clip = (c0[i] | c1[i] | c2[i]) & CLIP;
-                let (left, right) =
-                    (least(least(x0[i], x1[i]), x2[i]), greatest(greatest(x0[i], x1[i]), x2[i]));
-                let (up, down) =
-                    (least(least(y0[i], y1[i]), y2[i]), greatest(greatest(y0[i], y1[i]), y2[i]));
+                let ends = |a, b, c| (least(least(a, b), c), greatest(greatest(a, b), c));
+                let (x, y) = (ends(x0[i], x1[i], x2[i]), ends(y0[i], y1[i], y2[i]));
                 // The first and the last centre between the extremes, rounded like the corners.
                 // What is clipped may be anywhere, and these numbers of it are not used.
                 let first = |v: f32, half: i32| rounded(v).wrapping_add(half + HALF - 1) >> 8;
                 let last = |v: f32, half: i32| rounded(v).wrapping_add(half - HALF) >> 8;
-                let columns = (first(left, half_x), last(right, half_x));
-                let rows = (first(up, half_y), last(down, half_y));
+                let columns = (first(x.0, half_x), last(x.1, half_x));
+                let rows = (first(y.0, half_y), last(y.1, half_y));
                 let covers = (columns.0 <= columns.1)
-                    & (columns.1 >= 0)
-                    & (columns.0 < image.width)
+                    & (columns.1 >= left)
+                    & (columns.0 <= right)
                     & (rows.0 <= rows.1)
                     & (rows.1 >= top)
                     & (rows.0 <= bottom);

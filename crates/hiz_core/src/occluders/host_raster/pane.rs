@@ -1,12 +1,12 @@
-//! A band of the image: whole rows of tiles, which one thread draws.
+//! A pane of the image: a rectangle of whole tiles, which one thread draws.
 //!
-//! A band sees every triangle that meets it, in the order of the frame.
-//! What it draws depends on nothing outside of it, so the number of bands changes no pixel.
+//! A pane sees every triangle that meets it, in the order of the frame.
+//! How a pixel's depth is computed depends on the triangle and on the image alone, so the number of
+//! panes changes no pixel.
 
 use std::ops::{Range, RangeInclusive};
 
-use crate::host::vectors::{Eight, widest, with_eight};
-use crate::input::image::DepthConvention;
+use crate::host::vectors::{Eight, with_eight};
 use crate::occluders::host_raster::edges::{
     Edges, LARGE, STEP, Segment, Spans, Steps, bits, inside, to_pixels,
 };
@@ -25,18 +25,24 @@ use crate::occluders::meshlets::LANES;
 /// Coordinates of triangles up to this size along each axis have edge functions of 32 bits.
 const SMALL: i32 = 64 * UNITS;
 
-/// The depth of some rows of tiles.
+/// Columns of pixels that a pane begins at multiples of: tiles go in groups of [`LANES`].
+pub(super) const ACROSS: usize = LANES * SIDE;
+
+/// The depth of a rectangle of tiles.
 #[derive(Debug)]
-pub(super) struct Band {
+pub(super) struct Pane {
     image: Image,
+    /// The first column of pixels, and the one after the last; multiples of [`ACROSS`].
+    pub(super) left: i32,
+    pub(super) right: i32,
     /// The first row of pixels, and the one after the last; multiples of [`SIDE`].
     pub(super) top: i32,
     pub(super) bottom: i32,
     /// Tiles in a row: a multiple of [`LANES`], some past the image's edge.
     across: usize,
-    /// Pixels in a row, some past the image's edge.
+    /// Pixels in a row, some past the pane's edge.
     stride: usize,
-    /// In rows of the image, [`LANES`] at once.
+    /// In rows of the pane, [`LANES`] at once.
     tiles: Vec<Tiles>,
     /// By tile: pixels were written since `farthest` was computed.
     is_stale: Vec<bool>,
@@ -55,9 +61,9 @@ pub(super) struct Band {
     pixels: Vec<f32>,
 }
 
-impl Band {
-    pub(super) fn new(image: Image, top: i32, bottom: i32) -> Self {
-        let across = (image.width as usize).div_ceil(SIDE).next_multiple_of(LANES);
+impl Pane {
+    pub(super) fn new(image: Image, [left, right]: [i32; 2], [top, bottom]: [i32; 2]) -> Self {
+        let across = (right - left) as usize / SIDE;
         let rows = (bottom - top) as usize / SIDE;
         let count = across * rows;
         let cells = across / LANES * rows.div_ceil(LANES);
@@ -65,6 +71,8 @@ impl Band {
         let stride = (across + 1) * SIDE;
         Self {
             image,
+            left,
+            right,
             top,
             bottom,
             across,
@@ -79,6 +87,14 @@ impl Band {
             layers: vec![Layers::default()],
             pixels: vec![0.0; stride * (bottom - top) as usize],
         }
+    }
+
+    /// A pane that is all of an image.
+    #[cfg(feature = "methods")]
+    pub(super) fn of_image(image: Image) -> Self {
+        let right = (image.width as usize).next_multiple_of(ACROSS) as i32;
+        let bottom = (image.height as usize).next_multiple_of(SIDE) as i32;
+        Self::new(image, [0, right], [0, bottom])
     }
 
     /// Bytes of its arrays.
@@ -106,7 +122,23 @@ impl Band {
         self.layers.truncate(1);
     }
 
-    /// Whether nothing within `extent` would show in this band.
+    /// Whether an extent reaches into this pane.
+    #[inline(always)]
+    pub(super) fn meets(&self, extent: &Extent) -> bool {
+        let Extent { columns, rows, .. } = extent;
+        (rows.1 >= self.top)
+            & (rows.0 < self.bottom)
+            & (columns.1 >= self.left)
+            & (columns.0 < self.right)
+    }
+
+    /// The first and the last column, and the first and the last row of its pixels in the image.
+    pub(super) fn pixels(&self) -> [(i32, i32); 2] {
+        let Image { width, height, .. } = self.image;
+        [(self.left, self.right.min(width) - 1), (self.top, self.bottom.min(height) - 1)]
+    }
+
+    /// Whether nothing within `extent` would show in this pane.
     ///
     /// Cells are asked first, tiles where a cell cannot tell, and pixels where a tile cannot.
     pub(super) fn hides(&mut self, extent: &Extent) -> bool {
@@ -144,7 +176,7 @@ impl Band {
         let within = |(first, last): (i32, i32), begin: i32| {
             ((first - begin).max(0) as usize, (last - begin).min(STEP - 1) as usize)
         };
-        let (left, right) = within(extent.columns, (column * SIDE) as i32);
+        let (left, right) = within(extent.columns, self.left + (column * SIDE) as i32);
         let (top, bottom) = within(extent.rows, self.top + (row * SIDE) as i32);
         (top..=bottom).all(|y| {
             let pixels = self.row_of_tile(column, row, y);
@@ -176,13 +208,13 @@ impl Band {
 
     /// The rows and the columns of tiles that an extent meets.
     fn tiles_of(&self, extent: &Extent) -> Option<(RangeInclusive<usize>, RangeInclusive<usize>)> {
-        let (first, last) = (extent.rows.0.max(self.top), extent.rows.1.min(self.bottom - 1));
-        let tile = |pixel: i32| pixel as usize / SIDE;
-        (first <= last).then(|| {
-            (
-                tile(first - self.top)..=tile(last - self.top),
-                tile(extent.columns.0)..=tile(extent.columns.1),
-            )
+        let tiles = |(first, last): (i32, i32), begin: i32, end: i32| {
+            let tile = |pixel: i32| (pixel - begin) as usize / SIDE;
+            tile(first.max(begin))..=tile(last.min(end - 1))
+        };
+        self.meets(extent).then(|| {
+            let rows = tiles(extent.rows, self.top, self.bottom);
+            (rows, tiles(extent.columns, self.left, self.right))
         })
     }
 
@@ -213,7 +245,7 @@ impl Band {
         }
     }
 
-    /// The pixels of the tile in this column and row of the band's.
+    /// The pixels of the tile in this column and row of the pane's.
     #[inline(always)]
     fn pixels_of(&mut self, (column, row): (usize, usize)) -> Pixels<'_> {
         let first = row * SIDE * self.stride + column * SIDE;
@@ -246,7 +278,7 @@ impl Band {
         }
     }
 
-    /// Turns whatever the tile in this column and row of the band's is into pixels.
+    /// Turns whatever the tile in this column and row of the pane's is into pixels.
     #[inline(never)]
     fn expand(&mut self, (column, row): (usize, usize)) {
         let index = row * self.across + column;
@@ -255,7 +287,9 @@ impl Band {
         self.set_state(index, PIXELS);
     }
 
-    /// Draws the part of a triangle that lies in this band.
+    /// Draws the part of a triangle that lies in this pane.
+    ///
+    /// In which way is chosen by its part in the image, because their roundings differ.
     #[inline(never)]
     pub(super) fn draw(&mut self, t: &Triangle) {
         let bounds = |v: &[i32; 3]| (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
@@ -265,11 +299,15 @@ impl Band {
             (((left + HALF - 1) >> 8).max(0), ((right - HALF) >> 8).min(self.image.width - 1));
         let rows =
             (((up + HALF - 1) >> 8).max(self.top), ((down - HALF) >> 8).min(self.bottom - 1));
+        let own = (columns.0.max(self.left), columns.1.min(self.right - 1));
+        let columns = if is_planted!(self.image.fault, WayByPane) { own } else { columns };
+        let is_narrow = columns.1 - columns.0 < LANES as i32;
+        let columns = own;
         if columns.0 > columns.1 || rows.0 > rows.1 {
             return;
         }
         let edges = Edges::new(t, self.image.fault);
-        if columns.1 - columns.0 < LANES as i32 && right - left <= SMALL && down - up <= SMALL {
+        if is_narrow && right - left <= SMALL && down - up <= SMALL {
             self.draw_by_rows(t, &edges, columns, rows);
         } else {
             self.draw_by_tiles(t, &edges, columns, rows);
@@ -279,7 +317,8 @@ impl Band {
     /// Draws a triangle of at most [`LANES`] columns, one segment for each row.
     fn draw_by_rows(&mut self, t: &Triangle, edges: &Edges, columns: (i32, i32), rows: (i32, i32)) {
         let tile_row = |row: i32| (row - self.top) as usize / SIDE;
-        let (begin, end) = (columns.0 as usize / SIDE, columns.1 as usize / SIDE);
+        let tile_column = |column: i32| (column - self.left) as usize / SIDE;
+        let (begin, end) = (tile_column(columns.0), tile_column(columns.1));
         for row in tile_row(rows.0)..=tile_row(rows.1) {
             for column in begin..=end {
                 let tile = row * self.across + column;
@@ -297,9 +336,10 @@ impl Band {
         let mut at_row = edges.columns(edges.at_small(t, columns.0, rows.0));
         let x = to_pixels(columns.0 * UNITS + HALF - t.x[0]);
         let y = to_pixels(rows.0 * UNITS + HALF - t.y[0]);
-        let first = t.nearness + t.slope[0] * x;
-        let along = lanes(|l| first + t.slope[0] * l as f32);
-        let mut at = (rows.0 - self.top) as usize * self.stride + columns.0 as usize;
+        // `x + l` is exact, so the first column changes nothing.
+        let along = lanes(|l| t.nearness + t.slope[0] * (x + l as f32));
+        let own_column = (columns.0 - self.left) as usize;
+        let mut at = (rows.0 - self.top) as usize * self.stride + own_column;
         for row in 0..=rows.1 - rows.0 {
             let below = t.slope[1] * (y + row as f32);
             let Ok(pixels) = <&mut [f32; LANES]>::try_from(&mut self.pixels[at..at + LANES]) else {
@@ -369,18 +409,19 @@ impl Band {
             let own_row = (row - self.top / STEP) as usize;
             for group in met.0 / MANY..=(met.1 - 1) / MANY {
                 let column = group * MANY;
+                let own_group = (group - self.left / ACROSS as i32) as usize;
                 let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
                 let segment = Segment::new(t, steps, (x, y));
-                let tiles = own_row * (self.across / LANES) + group as usize;
+                let tiles = own_row * (self.across / LANES) + own_group;
                 let state = FULL + self.rises.len() as State - 1;
                 let (met, covered) = (bits(met, column), bits(covered, column));
                 let Some(open) = self.tiles[tiles].replace(eight, &segment, met, covered, state)
                 else {
                     continue;
                 };
-                let cell = own_row / LANES * (self.across / LANES) + group as usize;
+                let cell = own_row / LANES * (self.across / LANES) + own_group;
                 self.is_cell_stale[cell] = true;
-                let place = (column as usize, own_row);
+                let place = (own_group * LANES, own_row);
                 let at = three(|k| {
                     at_row[k] + i64::from(column - begin) * i64::from(STEP * edges.right[k])
                 });
@@ -394,8 +435,10 @@ impl Band {
     #[inline(always)]
     fn hides_all(&mut self, nearest: f32, (begin, end): (i32, i32), rows: (i32, i32)) -> bool {
         let cell = |row: i32| (row - self.top) as usize / SIDE / LANES;
+        let own = |column: i32| (column - self.left / STEP) as usize / LANES;
+        let (begin, end) = (own(begin), own(end));
         for row in cell(rows.0)..=cell(rows.1) {
-            for column in begin as usize / LANES..=end as usize / LANES {
+            for column in begin..=end {
                 if self.cell(row, column) < nearest {
                     return false;
                 }
@@ -433,7 +476,8 @@ impl Band {
             }
             let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
             let nearness = (t.nearness + t.slope[0] * x) + below;
-            let index = own_row * self.across + column as usize;
+            let own_column = (column - self.left / STEP) as usize;
+            let index = own_row * self.across + own_column;
             let high = least(steps.high[0] + (nearness + steps.high[1]), t.nearest);
             if high <= self.farthest(index) {
                 continue;
@@ -442,7 +486,7 @@ impl Band {
             let is_full = (0..3).all(|k| here[k] + i64::from(steps.loss[k]) >= 0);
             let here = three(|k| here[k].clamp(-LARGE, LARGE) as i32);
             let plane = Plane { nearness, slope: t.slope, nearest: t.nearest };
-            let place = (column as usize, own_row);
+            let place = (own_column, own_row);
             self.draw_tile(
                 eight,
                 place,
@@ -455,7 +499,7 @@ impl Band {
                 rows.clone(),
             );
             let cell = own_row / LANES * (self.across / LANES);
-            self.is_cell_stale[cell + column as usize / LANES] = true;
+            self.is_cell_stale[cell + own_column / LANES] = true;
         }
     }
 
@@ -501,7 +545,7 @@ impl Band {
 
     /// Draws a triangle into one tile: as a layer, or into pixels.
     ///
-    /// `place` is its column and row in the band, and `at` are the edges' functions at its first
+    /// `place` is its column and row in the pane, and `at` are the edges' functions at its first
     /// pixel.
     #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
     #[inline(always)]
@@ -610,72 +654,38 @@ impl Band {
         }
     }
 
-    /// Writes the band's part of some rows of the image as NDC depth.
+    /// Writes a row of its tiles as depth into rows of numbers that are `wide` apart, up to the
+    /// last tile that the image has.
     ///
-    /// `out` begins at the first of them, and they are `pitch` bytes apart.
-    /// A row ends at a multiple of 4 pixels; those past the width repeat the last one.
-    pub(super) fn write(
-        &self,
-        out: wgpu::WriteOnly<'_, [u8]>,
-        pitch: usize,
-        rows: Range<i32>,
-        convention: DepthConvention,
-    ) {
-        match convention {
-            DepthConvention::Reversed => widest(
-                #[inline(always)]
-                || self.write_as(out, pitch, rows, |nearness| nearness),
-            ),
-            DepthConvention::Standard => widest(
-                #[inline(always)]
-                || self.write_as(out, pitch, rows, |nearness| 1.0 - nearness),
-            ),
-        }
-    }
-
+    /// `lines` begins at the image's first column.
     #[inline(always)]
-    fn write_as(
+    pub(super) fn write_tiles(
         &self,
-        mut out: wgpu::WriteOnly<'_, [u8]>,
-        pitch: usize,
-        rows: Range<i32>,
+        row: usize,
+        lines: &mut [f32],
+        wide: usize,
         depth_of: impl Fn(f32) -> f32 + Copy,
     ) {
-        let (width, fault) = (self.image.width as usize, self.image.fault);
-        let end = width.next_multiple_of(4).min(pitch / size_of::<f32>());
-        let wide = width.next_multiple_of(SIDE);
-        // A row of tiles, which stays in the caches.
-        let mut lines = vec![0.0; SIDE * wide];
-        let (first, last) = (rows.start - self.top, rows.end - 1 - self.top);
-        for row in first / STEP..=last / STEP {
-            for column in 0..width.div_ceil(SIDE) {
-                let (tile, left) = (row as usize * self.across + column, column * SIDE);
-                let block = (&mut lines[..], wide, column);
-                match self.state(tile) {
-                    PIXELS => {
-                        let first = row as usize * SIDE * self.stride + left;
-                        let pixels = |y| self.pixels[first + y * self.stride..].as_chunks().0[0];
-                        fill(block, depth_of, pixels);
-                    }
-                    FULL.. => {
-                        let plane = self.full_plane(tile);
-                        fill(block, depth_of, |y| plane.row(y));
-                    }
-                    state => {
-                        let layers = self.layers_of(tile);
-                        fill(block, depth_of, |y| row_of_layers(state, layers, y, fault));
-                    }
+        let shifted = if is_planted!(self.image.fault, PanesShifted) { 1 } else { 0 };
+        let first = self.left as usize / SIDE;
+        for own_column in 0..self.across.min(wide / SIDE - first) {
+            let tile = row * self.across + own_column;
+            let column = if self.left > 0 { first + own_column - shifted } else { own_column };
+            let block = (&mut *lines, wide, column);
+            match self.state(tile) {
+                PIXELS => {
+                    let first = row * SIDE * self.stride + own_column * SIDE;
+                    let pixels = |y| self.pixels[first + y * self.stride..].as_chunks().0[0];
+                    fill(block, depth_of, pixels);
                 }
-            }
-            for (y, line) in (row * STEP..).zip(lines.chunks_exact_mut(wide)) {
-                if !(first..=last).contains(&y) {
-                    continue;
+                FULL.. => {
+                    let plane = self.full_plane(tile);
+                    fill(block, depth_of, |y| plane.row(y));
                 }
-                let repeated = line[width - 1];
-                line[width..].fill(repeated);
-                let bytes = bytemuck::cast_slice(&line[..end]);
-                let at = (y - first) as usize * pitch;
-                out.slice(at..at + bytes.len()).copy_from_slice(bytes);
+                state => {
+                    let (layers, fault) = (self.layers_of(tile), self.image.fault);
+                    fill(block, depth_of, |y| row_of_layers(state, layers, y, fault));
+                }
             }
         }
     }
