@@ -451,8 +451,8 @@ fn triangles_of(
     let meshlet = &shapes.meshlets[candidate.meshlet as usize];
     let mirrored = lens.mirrored && !is_planted!(image.fault, MirrorsIgnored);
     let faces = if mirrored { faces.reversed() } else { faces };
-    vertices.project(&shapes.blocks, meshlet, lens, image);
     let groups = candidate.groups.0..candidate.groups.1;
+    vertices.project(&shapes.blocks, meshlet, groups.clone(), lens, image);
     vertices.select(&shapes.blocks, meshlet, groups, faces, image, pixels);
     if candidate.extent.pixels() > SORTED_FROM * vertices.num_kept() as i64 {
         vertices.sort(&shapes.blocks, meshlet);

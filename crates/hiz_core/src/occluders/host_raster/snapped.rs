@@ -68,8 +68,8 @@ impl<'a> Grid<'a> {
         let faces = if mirrored { self.faces.reversed() } else { self.faces };
         let meshlet = &shapes.meshlets[meshlet as usize];
         let vertices = &mut *self.vertices;
-        vertices.project(&shapes.blocks, meshlet, lens, image);
         let (groups, pixels) = (meshlet.groups(), image.pixels());
+        vertices.project(&shapes.blocks, meshlet, groups.clone(), lens, image);
         vertices.select(&shapes.blocks, meshlet, groups, faces, image, pixels);
         for i in 0..vertices.num_kept() {
             let corners = vertices.corners(&shapes.blocks, meshlet, i);

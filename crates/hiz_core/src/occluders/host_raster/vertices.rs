@@ -44,39 +44,55 @@ impl Vertices {
         }
     }
 
-    /// Projects the vertices of `meshlet`.
+    /// Projects the vertices of the triangles in `groups` of `meshlet`.
     pub(super) fn project(
         &mut self,
         blocks: &Blocks,
         meshlet: &Meshlet,
+        groups: Range<u32>,
         lens: &Lens,
         image: &Image,
     ) {
         widest(
             #[inline(always)]
-            || self.project_groups(blocks, meshlet, lens, image),
+            || self.project_groups(blocks, meshlet, groups, lens, image),
         );
     }
 
     #[inline(always)]
-    fn project_groups(&mut self, blocks: &Blocks, meshlet: &Meshlet, lens: &Lens, image: &Image) {
-        let groups = (meshlet.num_vertices as usize).div_ceil(LANES);
+    fn project_groups(
+        &mut self,
+        blocks: &Blocks,
+        meshlet: &Meshlet,
+        groups: Range<u32>,
+        lens: &Lens,
+        image: &Image,
+    ) {
+        let count = (meshlet.num_vertices as usize).div_ceil(LANES);
         let first = meshlet.first_vertex as usize;
         let high: [&[[f32; LANES]]; 3] =
-            blocks.high.each_ref().map(|axis| axis[first..][..groups * LANES].as_chunks().0);
+            blocks.high.each_ref().map(|axis| axis[first..][..count * LANES].as_chunks().0);
         let low: Option<[&[[f32; LANES]]; 3]> = meshlet.first_low.map(|first| {
             let first = first as usize;
-            blocks.low.each_ref().map(|axis| axis[first..][..groups * LANES].as_chunks().0)
+            blocks.low.each_ref().map(|axis| axis[first..][..count * LANES].as_chunks().0)
         });
-        for group in 0..groups {
-            let from_eye = three(|k| {
-                let (hi, lo) = (lens.eye_hi[k], lens.eye_lo[k]);
-                let high = &high[k][group];
-                match &low {
-                    None => lanes(|i| (high[i] - hi) - lo),
-                    Some(low) => lanes(|i| (high[i] - hi) + (low[k][group][i] - lo)),
-                }
-            });
+        let used = if groups == meshlet.groups() {
+            0..count
+        } else {
+            groups_around(corners_of(blocks, meshlet, groups))
+        };
+        for group in used {
+            let from_eye = three(
+                #[inline(always)]
+                |k| {
+                    let (hi, lo) = (lens.eye_hi[k], lens.eye_lo[k]);
+                    let high = &high[k][group];
+                    match &low {
+                        None => lanes(|i| (high[i] - hi) - lo),
+                        Some(low) => lanes(|i| (high[i] - hi) + (low[k][group][i] - lo)),
+                    }
+                },
+            );
             self.project_group(group, &from_eye, lens, image);
         }
     }
@@ -149,8 +165,7 @@ impl Vertices {
         [(left, right), (top, bottom)]: [(i32, i32); 2],
     ) {
         let count = meshlet.triangles.len();
-        let corners = &blocks.corners[meshlet.first_group as usize..];
-        let corners = &corners[groups.start as usize..groups.end as usize];
+        let corners = corners_of(blocks, meshlet, groups.clone());
         // Rows run downwards, so what is counter-clockwise with y up has a negative area here.
         let sign = match culled {
             FaceCull::None => 0.0,
@@ -248,4 +263,28 @@ impl Vertices {
         let group = &blocks.corners[meshlet.first_group as usize + triangle / LANES];
         three(|k| usize::from(group[k][triangle % LANES]) % MAX_VERTICES)
     }
+}
+
+/// The corners of the triangles in `groups` of `meshlet`.
+#[inline(always)]
+fn corners_of<'a>(
+    blocks: &'a Blocks,
+    meshlet: &Meshlet,
+    groups: Range<u32>,
+) -> &'a [[[u8; LANES]; 3]] {
+    let corners = &blocks.corners[meshlet.first_group as usize..];
+    &corners[groups.start as usize..groups.end as usize]
+}
+
+/// Groups of vertices from the first one to the last one that these corners name.
+///
+/// Vertices are in the order of their first triangles, so a part of a meshlet names few others.
+#[inline(always)]
+fn groups_around(corners: &[[[u8; LANES]; 3]]) -> Range<usize> {
+    let (mut first, mut last) = (u8::MAX, 0);
+    for corner in corners.as_flattened().as_flattened() {
+        first = first.min(*corner);
+        last = last.max(*corner);
+    }
+    usize::from(first) / LANES..usize::from(last) / LANES + 1
 }
