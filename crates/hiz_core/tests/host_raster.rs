@@ -536,6 +536,22 @@ fn the_depth_of_a_surface_is_the_same_image() {
     }
 }
 
+#[test]
+fn one_image_is_cut_anew_for_the_threads_of_each_drawing() {
+    for seed in 0..20 {
+        let (view, mesh) = crowd(&mut Random(seed));
+        let (surface, camera) = (mesh.surface(view.seen.culled, None), &view.seen.camera);
+        let plain = draw(&surface, camera, PLAIN, None);
+        let mut raster = HostRaster::usual(camera.size());
+        for threads in [1, 4, 2, 1] {
+            raster.draw(&surface, camera, threads, true).unwrap();
+            let mut depth = vec![f32::NAN; plain.len()];
+            raster.write(&mut depth, camera, threads);
+            assert_eq!(depth, plain, "seed {seed}, {threads} threads");
+        }
+    }
+}
+
 /// The image may be as large as an image can be, and the wall reaches to its last pixel.
 #[test]
 fn the_largest_image_is_drawn_to_its_borders() {

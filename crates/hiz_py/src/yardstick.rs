@@ -174,7 +174,7 @@ impl Yardstick {
         threads: usize,
     ) -> PyResult<YardstickRaster> {
         let (occluders, camera) = (occluders.0.get(py)?, camera.0.clone());
-        let raster = Mutex::new(HostRaster::for_threads(camera.size(), threads));
+        let raster = Mutex::new(HostRaster::usual(camera.size()));
         let prepare = |_: &headless::Engine| {
             Ok(Raster { raster, occluders: Arc::clone(&occluders), camera, threads })
         };

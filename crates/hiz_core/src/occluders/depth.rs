@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::{ContextId, Gpu};
 use crate::gpu::row_staging::RowStaging;
-use crate::host::threads::{Locked, cores};
+use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::occluders::device_raster::{OCCLUDER_DEPTH_FORMAT, record_occluders};
@@ -108,12 +108,8 @@ impl OccluderDepth {
         let texture =
             gpu.texture("hiz.depth.image", (texels.width, texels.height), format, usage)?;
         let view = gpu.view(&texture)?;
-        let host = on_host.then(|| {
-            Locked::new(HostImage {
-                raster: HostRaster::for_threads(size, cores()),
-                convention: None,
-            })
-        });
+        let host = on_host
+            .then(|| Locked::new(HostImage { raster: HostRaster::new(size), convention: None }));
         Ok(Self {
             context: gpu.id(),
             size,

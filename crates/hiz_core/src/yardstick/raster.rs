@@ -24,9 +24,9 @@ impl HostRaster {
         Self { raster, size }
     }
 
-    /// An image in the panes that drawings on so many threads have outside of this module.
-    pub fn for_threads(size: ImageSize, threads: usize) -> Self {
-        Self { raster: host_raster::HostRaster::for_threads(size, threads), size }
+    /// An image in the panes that drawings outside of this module have, by their threads.
+    pub fn usual(size: ImageSize) -> Self {
+        Self { raster: host_raster::HostRaster::new(size), size }
     }
 
     /// An image like [`HostRaster::new`], whose rasteriser has a planted fault.

@@ -2,7 +2,6 @@
 
 use crate::error::Result;
 use crate::host::memory;
-use crate::host::threads::cores;
 use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::methods::occlusion_map::estimate::Estimate;
@@ -94,7 +93,7 @@ impl OcclusionMap {
         let eye = Eye::new(camera);
         let boxes = surface.copy_boxes();
         let chosen = chosen(&eye, &boxes, options);
-        let mut raster = HostRaster::for_threads(size, cores());
+        let mut raster = HostRaster::new(size);
         let drawing = DrawOptions { only: Only::Listed(&chosen), ..DrawOptions::default() };
         surface.draw_into(&mut raster, camera, Way { threads: None, skip: true }, &drawing)?;
         let pixels = size.pixels() as usize;

@@ -4,7 +4,8 @@
 //! because its rasteriser is made for pictures.
 //! This one draws depth alone, and looks first at what it need not draw:
 //!
-//! 1. `lens`: the box of each meshlet against the view; the rest is sorted front to back.
+//! 1. `in_view`: the box of each meshlet against the view, as its `lens` shows it; the rest is
+//!    sorted front to back.
 //! 2. `pane`: a meshlet whose box is behind all that was drawn where it would show is skipped
 //!    (Greene, Kass and Miller 1993; Greene 1996).
 //!    The farthest depths of tiles tell this, and pixels where tiles cannot.
@@ -36,6 +37,7 @@
 #![allow(clippy::needless_range_loop, reason = "loops over lanes read several arrays at once")]
 
 mod edges;
+mod in_view;
 mod lanes;
 mod lens;
 #[cfg(feature = "methods")]
@@ -56,12 +58,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::Result;
 use crate::host::memory;
-use crate::host::threads::{Locked, on_threads, worth_it};
-use crate::host::vectors::{Plain, with_eight};
-use crate::input::camera::Camera;
+use crate::host::threads::{Locked, cores, on_threads, worth_it};
+use crate::host::vectors::with_eight;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
 use crate::occluders::drawing::{DrawOptions, Last, Ranked, Touched, both};
+pub(crate) use crate::occluders::host_raster::in_view::Scene;
+use crate::occluders::host_raster::in_view::{Candidate, in_view};
 use crate::occluders::host_raster::lanes::three;
 use crate::occluders::host_raster::lens::{Extent, Image, Lens, extent};
 use crate::occluders::host_raster::pane::Pane;
@@ -71,27 +74,17 @@ use crate::occluders::host_raster::triangle::{End, Triangle, clipped};
 use crate::occluders::host_raster::vertices::Vertices;
 use crate::occluders::host_raster::written::write;
 use crate::occluders::meshlets::{LANES, Meshlet, PART_GROUPS};
-use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
-use crate::occluders::view::View;
 
 /// A depth image on the host, in the form that the rasteriser draws into.
 #[derive(Debug)]
 pub(crate) struct HostRaster {
     image: Image,
     panes: Panes,
-}
-
-/// What is drawn, and how it is seen.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Scene<'a> {
-    pub(crate) shapes: &'a Shapes,
-    /// The copies, with their numbers.
-    pub(crate) copies: &'a [(u32, &'a Placement)],
-    /// Of the image's size.
-    pub(crate) camera: &'a Camera,
-    /// Which faces do not occlude.
-    pub(crate) cull_mode: FaceCull,
+    /// Whether nothing was drawn yet since it was made or cleared.
+    is_clear: bool,
+    /// Whether the panes stay as they are.
+    is_cut: bool,
 }
 
 /// How it is drawn; none of it changes a pixel.
@@ -101,17 +94,6 @@ pub(crate) struct Way {
     pub(crate) threads: Option<usize>,
     /// Whether hidden meshlets are skipped.
     pub(crate) skip: bool,
-}
-
-/// A meshlet of one copy that may show, or a part of it.
-#[derive(Debug, Clone, Copy)]
-struct Candidate {
-    copy: u32,
-    meshlet: u32,
-    /// Its triangles, in groups: the first one and the one after the last.
-    groups: (u32, u32),
-    lens: u32,
-    extent: Extent,
 }
 
 /// What a drawing did.
@@ -159,26 +141,22 @@ impl Told {
 }
 
 impl HostRaster {
-    /// An empty image of one pane.
-    #[cfg(feature = "methods")]
+    /// An empty image, which is cut into panes for the threads of each drawing that finds it clear.
     pub(crate) fn new(size: ImageSize) -> Self {
-        Self::for_threads(size, 1)
-    }
-
-    /// An empty image for drawing with so many threads.
-    pub(crate) fn for_threads(size: ImageSize, threads: usize) -> Self {
-        Self::with_fault(size, grid_for(size, threads), Planted::default())
+        let one = Self::with_fault(size, [1, 1], Planted::default());
+        Self { is_cut: false, ..one }
     }
 
     /// An empty image of about so many columns and rows of panes, with a planted fault for tests.
     pub(crate) fn with_fault(size: ImageSize, grid: Grid, fault: Planted) -> Self {
         let image = Image::of_size(size, fault);
-        Self { image, panes: Panes::new(image, grid) }
+        Self { image, panes: Panes::new(image, grid), is_clear: true, is_cut: true }
     }
 
     /// Makes the image far everywhere.
     pub(crate) fn clear(&mut self) {
         self.panes.iter_mut().for_each(Pane::clear);
+        self.is_clear = true;
     }
 
     /// Bytes of the image.
@@ -201,7 +179,7 @@ impl HostRaster {
         options: &DrawOptions<'_>,
         last: &Told,
     ) -> Result<Drawn> {
-        let (lenses, mut candidates) = self.candidates(scene)?;
+        let (lenses, mut candidates) = in_view(scene, &self.image, way.threads)?;
         if options.is_limited() {
             candidates = within_limits(scene.shapes, &lenses, candidates, options, last);
         }
@@ -213,6 +191,11 @@ impl HostRaster {
         let faces = scene.cull_mode.as_seen_by(scene.camera);
         let drawn: Vec<AtomicBool> = candidates.iter().map(|_| AtomicBool::new(false)).collect();
         let threads = way.threads.unwrap_or_else(|| worth_it(self.drawing_ns(&candidates)));
+        if std::mem::take(&mut self.is_clear) && !self.is_cut {
+            // More may be added to the image than is drawn now.
+            let planned = way.threads.unwrap_or_else(|| threads.max(FEWEST_PLANNED.min(cores())));
+            self.panes.cut(image, grid_for(&image, planned));
+        }
         on_threads(threads, self.panes.by_work(&candidates), |pane| {
             let mut vertices = Vertices::new();
             for (candidate, drawn) in candidates.iter().zip(&drawn) {
@@ -255,46 +238,6 @@ impl HostRaster {
     /// About how long one thread takes to write some rows, in nanoseconds.
     fn writing_ns(&self, rows: u64) -> u64 {
         self.image.width as u64 * rows / 2
-    }
-
-    /// The meshlets that may show.
-    fn candidates(&self, scene: &Scene<'_>) -> Result<(Vec<Lens>, Vec<Candidate>)> {
-        let view = View::new(scene.camera)?;
-        let (mut lenses, mut candidates) = (Vec::new(), Vec::new());
-        for (copy, placement) in scene.copies {
-            let mesh = &scene.shapes.meshes[placement.mesh as usize];
-            if mesh.triangles.is_empty() {
-                continue;
-            }
-            let placed = view.placed(mesh, placement);
-            let lens = Lens::new(scene.camera, &self.image, &placed, placement.mirrored);
-            let before = candidates.len();
-            if mesh.meshlets.len() > 1
-                && extent(Plain, &lens, &self.image, mesh.min, mesh.max).is_none()
-            {
-                continue;
-            }
-            memory::reserve(&mut candidates, mesh.meshlets.len(), "meshlets")?;
-            let index = lenses.len() as u32;
-            with_eight!(eight => for number in mesh.meshlets.clone() {
-                let meshlet = &scene.shapes.meshlets[number as usize];
-                let extent = extent(eight, &lens, &self.image, meshlet.min, meshlet.max);
-                if let Some(extent) = extent {
-                    let (copy, groups) = (*copy, (0, meshlet.groups().end));
-                    candidates.push(Candidate {
-                        copy,
-                        meshlet: number,
-                        groups,
-                        lens: index,
-                        extent,
-                    });
-                }
-            });
-            if candidates.len() > before {
-                lenses.push(lens);
-            }
-        }
-        Ok((lenses, candidates))
     }
 
     /// The candidates, of which those that take much of the image are split.
@@ -415,6 +358,9 @@ fn within_limits(
     let is_kept = options.within_limits(&ranked.collect::<Vec<_>>());
     candidates.into_iter().zip(is_kept).filter_map(|(c, kept)| kept.then_some(c)).collect()
 }
+
+/// Threads that an image is cut for at least, where there are so many.
+const FEWEST_PLANNED: usize = 4;
 
 /// Meshlets are drawn in parts if so many pixels of their box come to each triangle.
 const SPLIT_FROM: i64 = 32;

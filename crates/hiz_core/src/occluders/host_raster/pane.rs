@@ -675,8 +675,12 @@ impl Pane {
             match self.state(tile) {
                 PIXELS => {
                     let first = row * SIDE * self.stride + own_column * SIDE;
-                    let pixels = |y| self.pixels[first + y * self.stride..].as_chunks().0[0];
-                    fill(block, depth_of, pixels);
+                    fill(
+                        block,
+                        depth_of,
+                        #[inline(always)]
+                        |y| self.pixels[first + y * self.stride..].as_chunks().0[0],
+                    );
                 }
                 FULL.. => {
                     let plane = self.full_plane(tile);

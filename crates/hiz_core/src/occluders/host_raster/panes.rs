@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use crate::input::image::ImageSize;
-use crate::occluders::host_raster::Candidate;
+use crate::occluders::host_raster::in_view::Candidate;
 use crate::occluders::host_raster::lens::Image;
 use crate::occluders::host_raster::pane::{ACROSS, Pane};
 use crate::occluders::host_raster::tile::SIDE;
@@ -18,6 +17,8 @@ const ROWS_AT_ONCE: usize = 8 * SIDE;
 #[derive(Debug)]
 pub(super) struct Panes {
     list: Vec<Pane>,
+    /// What was asked for, and what there is: small images have fewer.
+    wanted: Grid,
     grid: Grid,
     /// The smallest parts that an image is cut into, along each axis.
     parts: Grid,
@@ -27,32 +28,44 @@ pub(super) struct Panes {
 ///
 /// Most small triangles of a view of a landscape lie in a few rows, so there are columns, too.
 /// More panes even out better, and project more meshlets twice.
-pub(super) fn grid_for(size: ImageSize, threads: usize) -> Grid {
+pub(super) fn grid_for(image: &Image, threads: usize) -> Grid {
     const PANES_A_THREAD: usize = 3;
     /// Rows of tiles of a pane at least.
     const LEAST_ROWS: usize = 8;
     if threads <= 1 {
         return [1, 1];
     }
-    let panes = PANES_A_THREAD * threads;
-    let most = ((size.height as usize).div_ceil(SIDE) / LEAST_ROWS).max(1);
+    // A power of two, so that it seldom changes from view to view.
+    let panes = PANES_A_THREAD * threads.next_power_of_two();
+    let most = (parts_of(image)[1] / LEAST_ROWS).max(1);
     // Panes that are wider than the image cost less than those of its shape.
     let rows = (panes + panes / 2).isqrt().min(most);
     [panes.div_ceil(rows), rows]
 }
 
+/// How many columns of [`ACROSS`] pixels an image has, and how many rows of tiles.
+fn parts_of(image: &Image) -> Grid {
+    [(image.width as usize).div_ceil(ACROSS), (image.height as usize).div_ceil(SIDE)]
+}
+
 impl Panes {
     /// Cuts an image into about so many columns and rows.
-    pub(super) fn new(image: Image, grid: Grid) -> Self {
-        let parts =
-            [(image.width as usize).div_ceil(ACROSS), (image.height as usize).div_ceil(SIDE)];
-        let grid = [0, 1].map(|axis: usize| grid[axis].clamp(1, parts[axis]));
+    pub(super) fn new(image: Image, wanted: Grid) -> Self {
+        let parts = parts_of(&image);
+        let grid = [0, 1].map(|axis: usize| wanted[axis].clamp(1, parts[axis]));
         let edge = |axis: usize, k: usize| parts[axis] * k / grid[axis] * [ACROSS, SIDE][axis];
         let edges = |axis: usize, k: usize| [edge(axis, k) as i32, edge(axis, k + 1) as i32];
         let in_row = |row: usize| {
             (0..grid[0]).map(move |column| Pane::new(image, edges(0, column), edges(1, row)))
         };
-        Self { list: (0..grid[1]).flat_map(in_row).collect(), grid, parts }
+        Self { list: (0..grid[1]).flat_map(in_row).collect(), wanted, grid, parts }
+    }
+
+    /// Cuts an image that is far everywhere anew, if it should have other columns and rows.
+    pub(super) fn cut(&mut self, image: Image, grid: Grid) {
+        if grid != self.wanted {
+            *self = Self::new(image, grid);
+        }
     }
 
     /// All of them.
@@ -106,14 +119,18 @@ impl Panes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::image::ImageSize;
     use crate::occluders::host_raster::planted_fault::Planted;
 
     #[test]
     fn grids_by_hand() {
-        let grid = |width, height, threads| grid_for(ImageSize::new(width, height), threads);
+        let image =
+            |width, height| Image::of_size(ImageSize::new(width, height), Planted::default());
+        let grid = |width, height, threads| grid_for(&image(width, height), threads);
         assert_eq!(grid(640, 360, 1), [1, 1]);
         assert_eq!(grid(640, 360, 2), [2, 3]);
         assert_eq!(grid(320, 180, 2), [3, 2]);
+        assert_eq!(grid(640, 360, 9), [10, 5]);
         assert_eq!(grid(640, 360, 16), [10, 5]);
         assert_eq!(grid(1920, 1080, 16), [6, 8]);
         assert_eq!(grid(1, 1, 2), [6, 1]);

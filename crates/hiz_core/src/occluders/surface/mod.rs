@@ -116,7 +116,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
 use crate::host::memory;
-use crate::host::threads::{Locked, cores};
+use crate::host::threads::Locked;
 use crate::host::vectors::widest;
 use crate::input::bounds::Floats;
 use crate::input::camera::Camera;
@@ -339,7 +339,7 @@ impl OccluderSurface {
     /// - [`Error::OutOfMemory`].
     pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>> {
         let size = camera.size();
-        let mut raster = HostRaster::for_threads(size, cores());
+        let mut raster = HostRaster::new(size);
         let all = DrawOptions::default();
         self.draw_into(&mut raster, camera, Way { threads: None, skip: true }, &all)?;
         let mut depth = memory::list(size.pixels() as usize, "depth")?;
