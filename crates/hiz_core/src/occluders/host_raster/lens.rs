@@ -78,6 +78,7 @@ impl Image {
     }
 
     /// Its first and its last column, and its first and its last row.
+    #[cfg(feature = "methods")]
     pub(super) fn pixels(&self) -> [(i32, i32); 2] {
         [(0, self.width - 1), (0, self.height - 1)]
     }
