@@ -40,7 +40,9 @@ if [ "$driver" = swiftshader ] && [ -n "$(lavapipe_icd)" ]; then
   check "verdicts of both drivers" env VK_DRIVER_FILES="$both" VK_ICD_FILENAMES="$both" \
     cargo test --workspace "${LOCKED[@]}" --test drivers -- --nocapture
 fi
-check "Python tests" "$VENV_PYTHON" -m pytest -m "not slow"
+# A process for each core, and each file in one of them, because a file's tests share its device.
+check "Python tests" "$VENV_PYTHON" -m pytest -m "not slow" \
+  --numprocesses=auto --maxprocesses=4 --dist=loadfile
 check "processes that end" "$VENV_PYTHON" scripts/exits.py --rust 60 --python 15
 check "packages" scripts/package.sh
 printf -- '-- all tests on %s: %d s\n' "$driver" $((SECONDS - started))

@@ -77,12 +77,17 @@ def test_two_texels_on_odd_sizes_miss_pixels() -> None:
 
 
 def test_mip_texel_covers_its_pixel() -> None:
-    """All sizes of 1 to 130 rows and columns, all levels, every row and column."""
+    """All sizes of 1 to 130 rows by those around powers of two, all levels, every row and column.
+
+    Rows and columns swap roles in every other size.
+    """
     lengths = range(1, 131)
+    others = [*range(1, 10), 15, 16, 17, 31, 32, 33, 63, 64, 65, 97, 127, 128, 129, 130]
     normalized = {n: list(supports(n)) for n in lengths}
     wrong = 0
-    for height in lengths:
-        for width in lengths:
+    for one in lengths:
+        for k, other in enumerate(others):
+            height, width = (one, other) if (one + k) % 2 else (other, one)
             i = np.arange(max(height, width))
             pixels = np.stack([i % height, i % width], axis=-1)
             for level in range(max(height, width).bit_length()):
