@@ -2,6 +2,8 @@
 # The tests that take minutes:
 # - adversarial cases against the exact oracle, a million (HIZVK_SOAK_CASES) for each kind of
 #   bounds, from seed HIZVK_SOAK_SEED on;
+# - the random tests of `make test` with eight times (HIZVK_SOAK_TIMES) the cases: culls in every
+#   mode and in groups, depth that fits, counts of pixels, all cases of planted faults;
 # - the certificates in every arithmetic that WGSL permits;
 # - the example's scenes with and without culling, by 1000 random cameras (HIZVK_SOAK_CAMERAS) each;
 # - the viewer's scenes with and without culling, 300 frames (HIZVK_VIEWER_FRAMES) each;
@@ -27,10 +29,21 @@ slow_python_tests() {
   # 5: no test is marked slow
   [ "$status" = 5 ] || return "$status"
 }
+random_rust_tests() {
+  export HIZVK_SOAK_TIMES=${HIZVK_SOAK_TIMES:-8}
+  if have cargo-nextest; then
+    cargo nextest run --workspace "${LOCKED[@]}" --no-fail-fast \
+      -E 'binary(differential) | binary(fit_volume) | binary(pixels) | binary(planted_faults)'
+  else
+    cargo test --workspace "${LOCKED[@]}" --no-fail-fast \
+      --test differential --test fit_volume --test pixels --test planted_faults
+  fi
+}
 random_arrays() {
   HIZVK_FUZZ=random "$VENV_PYTHON" -m pytest tests/test_fuzz.py tests/test_fuzz_arrays.py
 }
 step "slow Rust tests" slow_rust_tests
+step "random Rust tests with more cases" random_rust_tests
 step "processes that end" "$VENV_PYTHON" scripts/exits.py
 step "fuzzing with new examples" random_arrays
 step "slow Python tests" slow_python_tests

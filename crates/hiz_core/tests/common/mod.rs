@@ -83,6 +83,14 @@ fn open() -> Engine {
     engine
 }
 
+/// How many times as many random cases as in `make test`: `HIZVK_SOAK_TIMES`, which `make soak`
+/// sets.
+pub(crate) fn soak_times() -> usize {
+    std::env::var("HIZVK_SOAK_TIMES").map_or(1, |s| {
+        s.parse().unwrap_or_else(|_| panic!("HIZVK_SOAK_TIMES: expected a number, got {s:?}"))
+    })
+}
+
 /// The words of a buffer after everything that was submitted.
 pub(crate) fn words_of(engine: &Engine, buffer: &wgpu::Buffer) -> Vec<u32> {
     let (told, answer) = std::sync::mpsc::channel();

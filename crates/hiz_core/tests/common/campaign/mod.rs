@@ -28,7 +28,7 @@ use hiz_core::{
 };
 use hiz_ref::{Options, Outcome, OwnDepth, Verdict, View, Volume};
 
-use crate::common::Random;
+use crate::common::{Random, soak_times};
 use scene::Scene;
 
 pub(crate) use arrays::Arrays;
@@ -189,9 +189,23 @@ impl Campaign {
 
     /// Culls every round on the device and asks the oracle.
     pub(crate) fn run(self, engine: &Engine) -> Report {
+        self.run_while(engine, |_| true)
+    }
+
+    /// The rounds up to the first false cull, which is all that a planted fault has to show.
+    /// In `make soak` all rounds, to see which classes show it.
+    pub(crate) fn run_until_red(self, engine: &Engine) -> Report {
+        self.run_while(engine, |report| soak_times() > 1 || report.total().false_culls == 0)
+    }
+
+    /// Culls one round after the other and asks the oracle, as long as `goes_on` says so.
+    pub(crate) fn run_while(self, engine: &Engine, goes_on: impl Fn(&Report) -> bool) -> Report {
         let mut report = Report::new(self.classes, self.count_keeps);
         let mut told = false;
         for round in self.rounds() {
+            if !goes_on(&report) {
+                break;
+            }
             let masks = if self.groups {
                 round.grouped_masks(engine).map(|(masks, tested)| {
                     report.tested.add(tested);
