@@ -6,7 +6,7 @@ mod common;
 mod campaign;
 
 use campaign::{Campaign, KINDS, Round};
-use common::{CONVENTIONS, camera_along_z, engine, ndc};
+use common::{CONVENTIONS, camera_along_z, engine, ndc, soak_times};
 use hiz_core::headless::Engine;
 use hiz_core::{
     Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Depths, Fit, Floats, Hierarchy,
@@ -122,14 +122,16 @@ fn campaign(seed: u64, rounds: usize, coverage: Coverage) -> Campaign {
 #[test]
 fn no_count_contradicts_the_oracle() {
     for (seed, coverage) in [(71, Coverage::Area), (72, Coverage::Sample)] {
-        let fitted = run(&engine(), campaign(seed, 2, coverage).fitted(&KINDS, false), None);
+        let rounds = campaign(seed, soak_times(), coverage).fitted(&KINDS, false);
+        let fitted = run(&engine(), rounds, None);
         eprintln!("{coverage:?}, depth that fits: {fitted:?}");
         assert_eq!(fitted.contradictions, 0);
         assert!(fitted.hidden > 0 && fitted.open > 0 && fitted.inside > 0, "{fitted:?}");
         // Most that can be decided is, although the scenes are made to be nearly undecidable.
         assert!(fitted.inside < fitted.must_be_inside + fitted.touched / 4 * 3, "{fitted:?}");
         let small = |round: &Round| round.view.width * round.view.height <= 4096;
-        let rounds = campaign(seed + 10, 1, coverage).rounds().filter(small);
+        let some = Campaign { volumes: 2, ..campaign(seed + 10, soak_times(), coverage) };
+        let rounds = some.rounds().filter(small);
         let loose = run(&engine(), rounds, None);
         eprintln!("{coverage:?}, campaign: {loose:?}");
         assert_eq!(loose.contradictions, 0);
@@ -141,7 +143,9 @@ fn every_budget_leaves_an_upper_bound() {
     for budget in [1, 20] {
         let tally = run(
             &engine(),
-            campaign(73, 1, Coverage::Area).fitted(&KINDS, false).take(80),
+            campaign(73, soak_times(), Coverage::Area)
+                .fitted(&KINDS, false)
+                .take(40 * soak_times()),
             Some(budget),
         );
         assert_eq!(tally.contradictions, 0, "{budget}");
@@ -315,10 +319,12 @@ const ALL_ARE_LARGE: (&str, &str) =
 fn large_rectangles_count_like_small_ones() {
     let engine = Engine::with_planted_faults(None, &[ALL_ARE_LARGE]).expect("a Vulkan driver");
     for coverage in [Coverage::Area, Coverage::Sample] {
-        let rounds = campaign(76, 1, coverage).fitted(&KINDS, false).take(60);
+        let rounds = campaign(76, soak_times(), coverage).fitted(&KINDS, false);
+        let rounds = rounds.take(30 * soak_times());
         assert_eq!(run(&engine, rounds, None).contradictions, 0, "{coverage:?}");
     }
-    let rounds = campaign(77, 1, Coverage::Area).fitted(&KINDS, false).take(30);
+    let rounds = campaign(77, soak_times(), Coverage::Area).fitted(&KINDS, false);
+    let rounds = rounds.take(15 * soak_times());
     assert_eq!(run(&engine, rounds, Some(20)).contradictions, 0);
     for levels in campaign::MISSING_LEVELS {
         let rounds = campaign(78, 1, Coverage::Area)
