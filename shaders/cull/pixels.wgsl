@@ -2,7 +2,8 @@
 // through it, and in how many neither is certain.
 //
 // It is a pass of its own behind the cull, with two dispatches.
-// In the first one, `count_of_pixels`, an invocation looks at all pixels of a small rectangle.
+// In the first one, `count_of_pixels` or `count_of_pixels_by_few`, an invocation looks at all of
+// the pixels of a small rectangle.
 // Large rectangles are listed for the second one, which is in `pixels_large.wgsl`.
 //
 // What is used here and defined elsewhere:
@@ -12,15 +13,13 @@
 // - `pixels_look.wgsl`: `look_at_pixels`
 // - `classify.wgsl`: `pixel_interval`, `between_samples`, `inside_block`
 
-// Invocations of a workgroup.
-// Twin: `WORKGROUP` in `crates/hiz_core/src/cull/pixels.rs`.
+// Invocations of a workgroup, and those of one on a processor.
+// Twins: `WORKGROUP` and `FEW` in `crates/hiz_core/src/cull/pixels.rs`.
 const WORKGROUP: u32 = 128u;
-// How many instances each of them takes: one after the other, of all that the workgroup orders by
-// the size of their rectangles.
-override PER_INVOCATION: u32;
-// Twin: `MOST_PER_INVOCATION` there.
-const MOST_PER_INVOCATION: u32 = 2u;
-const ORDERED: u32 = WORKGROUP * MOST_PER_INVOCATION;
+const FEW: u32 = 8u;
+// How many instances a workgroup orders by the size of their rectangles, at most.
+// Twin: `MOST_ORDERED` there.
+const MOST_ORDERED: u32 = 512u;
 
 // A rectangle is large if it has more groups of four pixels of a row.
 const SMALL_ROWS: u32 = 1023u;
@@ -47,7 +46,9 @@ struct Counting {
     budget: u32,
     // Pixels of an instance that count as none.
     negligible: u32,
-    padding: vec2<u32>,
+    // How many instances a workgroup takes, up to MOST_ORDERED.
+    ordered: u32,
+    padding: u32,
 }
 
 @group(1) @binding(0) var<uniform> piece: Piece;
@@ -169,24 +170,36 @@ fn write_counts(i: u32, found: PixelCounts) {
     }
 }
 
+// Reads both ends of each row of a rectangle, which brings them near.
+// Nothing is done in between, so that a processor waits for many of them at the same time.
+// Returns 0.
+fn touch_rows(r: vec4<u32>) -> u32 {
+    let ends = r.xz >> vec2<u32>(VECTOR_LOG2);
+    var bits = 0u;
+    var y = r.y;
+    loop {
+        bits |= pixel_row(ends.x, y).x | pixel_row(ends.y, y).x;
+        y += 1u;
+        continuing {
+            break if y > r.w;
+        }
+    }
+    return bits & view.runtime_zero;
+}
+
 // Looks at the pixels of a small rectangle, one row after the other.
 fn count_small(planes: ptr<function, PixelPlanes>, r: vec4<u32>) -> PixelCounts {
     var walk = Walk(0u, 0u, 0u, 0u);
-    var left = counting.budget;
+    var left = counting.budget - touch_rows(r);
     let begin = r.x >> VECTOR_LOG2;
     var at = vec2<u32>(begin, r.y);
-    var depths = read_depths(at);
     loop {
         left -= 1u;
-        var next = at + vec2<u32>(1u, 0u);
-        if VECTOR * next.x > r.z {
-            next = vec2<u32>(begin, at.y + 1u);
+        look_at_pixels(planes, at, read_depths(at), r, &walk);
+        at.x += 1u;
+        if VECTOR * at.x > r.z {
+            at = vec2<u32>(begin, at.y + 1u);
         }
-        // They are read ahead, so that the device need not wait for them.
-        let ahead = read_depths(next);
-        look_at_pixels(planes, at, depths, r, &walk);
-        at = next;
-        depths = ahead;
         continuing {
             break if at.y > r.w || left == 0u;
         }
@@ -197,14 +210,16 @@ fn count_small(planes: ptr<function, PixelPlanes>, r: vec4<u32>) -> PixelCounts 
 // Of each class: how many rectangles there are, and then where they begin.
 var<workgroup> classes: array<atomic<u32>, CLASSES>;
 // Of each instance the class of its rectangle, and its place in that class.
-var<workgroup> keys: array<u32, ORDERED>;
+var<workgroup> keys: array<u32, MOST_ORDERED>;
 const CLASS_SHIFT: u32 = 16u;
 const PLACE_MASK: u32 = (1u << CLASS_SHIFT) - 1u;
 // The instance has no small rectangle.
 const NO_KEY: u32 = 0xffffffffu;
+// How many instances the workgroup takes.
+var<workgroup> ordered_here: u32;
 var<workgroup> small_count: u32;
 // The instances with small rectangles, by class.
-var<workgroup> small: array<u32, ORDERED>;
+var<workgroup> small: array<u32, MOST_ORDERED>;
 
 // Answers an instance, or lists it as a large one, or finds the class of its rectangle.
 fn key_of(i: u32) -> u32 {
@@ -239,21 +254,22 @@ fn count_alone(i: u32) {
     write_counts(i, found);
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn count_of_pixels(
-    @builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32,
-) {
+// Counts the instances of a workgroup of so many invocations; `lane` is one of them.
+fn count_by(invocations: u32, group: u32, lane: u32) {
     begin();
     // The memory of a workgroup holds anything at first.
-    if lane < CLASSES {
-        atomicStore(&classes[lane], 0u);
+    for (var k = lane; k < CLASSES; k += invocations) {
+        atomicStore(&classes[k], 0u);
     }
-    workgroupBarrier();
-    let ordered = WORKGROUP * PER_INVOCATION;
+    // Mesa 22.3 crashes in compiling a loop that ends at a number of a uniform here.
+    if lane == 0u {
+        ordered_here = counting.ordered;
+    }
+    let ordered = workgroupUniformLoad(&ordered_here);
     var t = lane;
     loop {
-        keys[t] = key_of(ordered * group.x + t);
-        t += WORKGROUP;
+        keys[t] = key_of(ordered * group + t);
+        t += invocations;
         continuing {
             break if t >= ordered;
         }
@@ -274,9 +290,9 @@ fn count_of_pixels(
         let key = keys[t];
         if key != NO_KEY {
             small[atomicLoad(&classes[key >> CLASS_SHIFT]) + (key & PLACE_MASK)] =
-                ordered * group.x + t;
+                ordered * group + t;
         }
-        t += WORKGROUP;
+        t += invocations;
         continuing {
             break if t >= ordered;
         }
@@ -287,9 +303,24 @@ fn count_of_pixels(
         if t < small_count {
             count_alone(small[t]);
         }
-        t += WORKGROUP;
+        t += invocations;
         continuing {
             break if t >= small_count;
         }
     }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn count_of_pixels(
+    @builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32,
+) {
+    count_by(WORKGROUP, group.x, lane);
+}
+
+// The same on a processor, which pays for each eight invocations that wait at a barrier.
+@compute @workgroup_size(FEW)
+fn count_of_pixels_by_few(
+    @builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32,
+) {
+    count_by(FEW, group.x, lane);
 }

@@ -90,11 +90,11 @@ fn at_signs(v: vec4<f32>, signs: vec2<f32>) -> f32 {
     return select(pair.y, pair.x, signs.y > 0.0);
 }
 
-// The plane through an edge of the outline; all corners are those of the faces a and b.
+// The plane through an edge of the outline: its slope and offset.
+// All corners are those of the faces a and b.
 fn edge_plane(
-    planes: ptr<function, PixelPlanes>, i: u32, begin: Face, end: Face, signs: vec2<f32>,
-    a: Face, b: Face, p: Projected, most: vec2<f32>,
-) {
+    begin: Face, end: Face, signs: vec2<f32>, a: Face, b: Face, p: Projected, most: vec2<f32>,
+) -> vec3<f32> {
     let start = vec2<f32>(at_signs(begin.x, signs), at_signs(begin.y, signs));
     let along = vec2<f32>(at_signs(end.x, signs), at_signs(end.y, signs)) - start;
     let across = vec2<f32>(along.y, -along.x) / max(abs(along.x), abs(along.y));
@@ -108,8 +108,34 @@ fn edge_plane(
     let slope = sign * guess.slope;
     let least = select(-ends.y, ends.x, is_low);
     let offset = proved_offset(tilted(0.0, slope, p), least, slope, most, p);
-    (*planes).outline_slopes[i] = slope;
-    (*planes).outlines[i] = select(offset, NO_PLANE, guess.is_steep);
+    return vec3<f32>(slope, select(offset, NO_PLANE, guess.is_steep));
+}
+
+// Puts the planes of two faces behind those of four others.
+fn push_faces(planes: ptr<function, PixelPlanes>, first: vec4<f32>, second: vec4<f32>) {
+    (*planes).faces[0] = (*planes).faces[2];
+    (*planes).faces[1] = (*planes).faces[3];
+    (*planes).faces[2] = (*planes).faces[FACE_PLANES - 2u];
+    (*planes).faces[3] = (*planes).faces[FACE_PLANES - 1u];
+    (*planes).faces[FACE_PLANES - 2u] = first;
+    (*planes).faces[FACE_PLANES - 1u] = second;
+}
+
+// Puts a plane of the outline behind five others.
+fn push_edge(planes: ptr<function, PixelPlanes>, edge: vec3<f32>) {
+    (*planes).outline_slopes[0] = (*planes).outline_slopes[1];
+    (*planes).outline_slopes[1] = (*planes).outline_slopes[2];
+    (*planes).outline_slopes[2] = (*planes).outline_slopes[3];
+    (*planes).outline_slopes[3] = (*planes).outline_slopes[OUTLINE_PLANES - 2u];
+    (*planes).outline_slopes[OUTLINE_PLANES - 2u] =
+        (*planes).outline_slopes[OUTLINE_PLANES - 1u];
+    (*planes).outline_slopes[OUTLINE_PLANES - 1u] = edge.xy;
+    (*planes).outlines[0] = (*planes).outlines[1];
+    (*planes).outlines[1] = (*planes).outlines[2];
+    (*planes).outlines[2] = (*planes).outlines[3];
+    (*planes).outlines[3] = (*planes).outlines[OUTLINE_PLANES - 2u];
+    (*planes).outlines[OUTLINE_PLANES - 2u] = (*planes).outlines[OUTLINE_PLANES - 1u];
+    (*planes).outlines[OUTLINE_PLANES - 1u] = edge.z;
 }
 
 // The faces at both ends of each axis.
@@ -147,14 +173,14 @@ fn fill_planes(planes: ptr<function, PixelPlanes>, p: Projected, most: vec2<f32>
         vec4<f32>(a.x.yw, b.x.yw), vec4<f32>(a.y.yw, b.y.yw), vec4<f32>(a.z.yw, b.z.yw));
     // Loops over the axes keep the code short.
     // Without them SwiftShader takes tens of gigabytes to compile it.
-    // Each step hands on the next axis, since lavapipe is slow to index arrays.
+    // Each step hands on the next axis, and moves planes on by constant places, since lavapipe is
+    // slow to index arrays.
     var axes = Axes(a, b, c, d, e, f);
     var facing = vec3<f32>(0.0);
     for (var axis = 0u; 2u * axis < FACE_PLANES; axis += 1u) {
         let first = face_plane(axes.first_0, axes.second_0, true, p, most);
         let second = face_plane(axes.second_0, axes.first_0, false, p, most);
-        (*planes).faces[2u * axis] = first;
-        (*planes).faces[2u * axis + 1u] = second;
+        push_faces(planes, first, second);
         facing = vec3<f32>(facing.yz, facing_of(first, second));
         axes = next_axis(axes);
     }
@@ -163,8 +189,8 @@ fn fill_planes(planes: ptr<function, PixelPlanes>, p: Projected, most: vec2<f32>
         let signs = outline_signs(select(facing.yz, facing.zy, axis == 1u));
         let begin = axes.second_0;
         let end = axes.first_0;
-        edge_plane(planes, 2u * axis, begin, end, signs.xy, a, b, p, most);
-        edge_plane(planes, 2u * axis + 1u, begin, end, signs.zw, a, b, p, most);
+        push_edge(planes, edge_plane(begin, end, signs.xy, a, b, p, most));
+        push_edge(planes, edge_plane(begin, end, signs.zw, a, b, p, most));
         facing = facing.yzx;
         axes = next_axis(axes);
     }

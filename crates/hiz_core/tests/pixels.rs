@@ -373,7 +373,10 @@ fn planted_faults_turn_it_red() {
             "a sign of a difference reversed",
             &[("signs_of(surface + most_over", "signs_of(-surface - most_over")],
         ),
-        ("the depths of the row before", &[("depths = ahead;", "")]),
+        (
+            "the depths of the first row",
+            &[("read_depths(at), r", "read_depths(r.xy >> vec2<u32>(VECTOR_LOG2, 0u)), r")],
+        ),
         (
             "the front taken for the back",
             &[(

@@ -40,7 +40,6 @@ const VALUES: &[(&str, &[f64])] = &[
     ("ODD_X", FLAG),
     ("ODD_Y", FLAG),
     ("ONE_SAMPLE", FLAG),
-    ("PER_INVOCATION", &[1.0, 2.0]),
     ("PLANES", &[1.0, 4.0]),
     ("RECEIVERS", FLAG),
     ("RECORD_WORDS", &[4.0, 5.0]),

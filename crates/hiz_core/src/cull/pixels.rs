@@ -16,6 +16,7 @@ use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
+use crate::host::threads::cores;
 use crate::input::bounds::BoundsKind;
 use crate::instances::piece::{Piece, RECORD_BINDINGS};
 use crate::output::visible::Visible;
@@ -23,22 +24,40 @@ use crate::output::visible::Visible;
 /// Invocations of a workgroup; `shaders/cull/pixels.wgsl`.
 pub(crate) const WORKGROUP: u32 = 128;
 
-/// How many instances each of them takes at most; `shaders/cull/pixels.wgsl`.
-pub(crate) const MOST_PER_INVOCATION: u32 = 2;
+/// Those of a workgroup on a processor; `shaders/cull/pixels.wgsl`.
+pub(crate) const FEW: u32 = 8;
+
+/// How many instances a workgroup takes at most; `shaders/cull/pixels.wgsl`.
+pub(crate) const MOST_ORDERED: u32 = 512;
+
+/// And at least, on a processor: with fewer, those that run side by side differ more in size.
+const LEAST_ORDERED: u32 = 64;
+
+/// Workgroups per core of a processor, so that a long one holds up few others.
+const PER_CORE: u32 = 2;
 
 /// Invocations that count a large rectangle together; `shaders/cull/pixels_large.wgsl`.
 pub(crate) const TEAM: u32 = 8;
 
-/// How many instances each invocation takes.
-/// A processor pays for each barrier, and has few threads to take workgroups.
-fn per_invocation(gpu: &Gpu) -> u32 {
-    if gpu.is_processor() { MOST_PER_INVOCATION } else { 1 }
+/// How many workgroups are enough for all cores of a processor.
+/// Each costs time.
+fn for_all_cores() -> u32 {
+    u32::try_from(cores()).unwrap_or(u32::MAX).saturating_mul(PER_CORE)
+}
+
+/// How many of so many instances a workgroup takes.
+fn ordered(gpu: &Gpu, count: u32) -> u32 {
+    if gpu.is_processor() {
+        let share = count.div_ceil(for_all_cores()).clamp(LEAST_ORDERED, MOST_ORDERED);
+        share.next_multiple_of(FEW)
+    } else {
+        WORKGROUP
+    }
 }
 
 /// Workgroups that share the large rectangles out among them, at most.
-/// On a processor each costs time, and there are few threads to take them.
 fn most_teams(gpu: &Gpu) -> u32 {
-    if gpu.is_processor() { 16 } else { 1024 }
+    if gpu.is_processor() { for_all_cores() } else { 1024 }
 }
 
 /// What a count writes: the counts, the mask of what is not negligible, and the list of large
@@ -53,7 +72,8 @@ const COUNTED_BINDINGS: &[(u32, Binding)] =
 pub(crate) struct CountingUniform {
     pub(crate) budget: u32,
     pub(crate) negligible: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) ordered: u32,
+    pub(crate) padding: u32,
 }
 
 /// The shader that counts pixels.
@@ -102,23 +122,22 @@ fn pixels_pipeline(
         source: pixels_module(key.store, key.kind),
         entry_point,
         layouts: &layouts(gpu, key.store, RECORD_BINDINGS, written)?,
-        constants: &pixels_constants(gpu, key, one_sample, shown),
+        constants: &pixels_constants(key, one_sample, shown),
     })
 }
 
+/// What counts all instances.
+fn entry_point(gpu: &Gpu) -> &'static str {
+    if gpu.is_processor() { "count_of_pixels_by_few" } else { "count_of_pixels" }
+}
+
 /// The constants of a count of pixels.
-fn pixels_constants(
-    gpu: &Gpu,
-    key: &CullKey,
-    one_sample: bool,
-    shown: bool,
-) -> Vec<(&'static str, f64)> {
+fn pixels_constants(key: &CullKey, one_sample: bool, shown: bool) -> Vec<(&'static str, f64)> {
     // The rectangle of a footprint and its fit have no effect, because every pixel is looked for.
     let key = CullKey { footprint_log2: 1, descent: true, fit_volume: true, ..*key };
     classify_constants(&key)
         .into_iter()
         .chain([("ONE_SAMPLE", flag(one_sample)), ("SHOWN", flag(shown))])
-        .chain([("PER_INVOCATION", f64::from(per_invocation(gpu)))])
         .collect()
 }
 
@@ -126,10 +145,10 @@ fn pixels_constants(
 fn bind_counted(
     gpu: &Gpu,
     visible: &Visible,
-    piece: usize,
+    (p, piece): (usize, &Piece),
     negligible: Option<u32>,
 ) -> Result<wgpu::BindGroup> {
-    let output = &visible.pieces[piece];
+    let output = &visible.pieces[p];
     let counts = output.pixels.as_ref().expect("the outputs have counts");
     let large = output.large.as_ref().expect("a list beside the counts");
     check_alive(counts)?;
@@ -143,7 +162,8 @@ fn bind_counted(
             &CountingUniform {
                 budget: visible.outputs().pixel_budget.unwrap_or(u32::MAX).max(1),
                 negligible: negligible.unwrap_or(0),
-                padding: [0; 2],
+                ordered: ordered(gpu, piece.count()),
+                padding: 0,
             },
         )?;
         gpu.bind_group(
@@ -197,17 +217,19 @@ impl PixelPass {
         let view = seen.bind(gpu, pyramid, false)?;
         let flags = (seen.has_one_sample(), negligible.is_some());
         let pipelines = [
-            pixels_pipeline(gpu, &seen.key, flags, "count_of_pixels")?,
+            pixels_pipeline(gpu, &seen.key, flags, entry_point(gpu))?,
             pixels_pipeline(gpu, &seen.key, flags, "count_of_many_pixels")?,
         ];
         let bound = |(p, piece): (usize, &Piece)| {
             let output = &visible.pieces[p];
             let large = output.large.clone().expect("a list beside the counts");
-            let written = bind_counted(gpu, visible, p, negligible)?;
+            let written = bind_counted(gpu, visible, (p, piece), negligible)?;
             let records = inputs.among.map_or(&piece.bindings, |among| among.records(p)).clone();
             let count = if inputs.idle { 0 } else { piece.count() };
-            let ordered = WORKGROUP * per_invocation(gpu);
-            let workgroups = [count.div_ceil(ordered), count.div_ceil(TEAM).min(most_teams(gpu))];
+            let workgroups = [
+                count.div_ceil(ordered(gpu, piece.count())),
+                count.div_ceil(TEAM).min(most_teams(gpu)),
+            ];
             Ok(CountedPiece { records, written, large, workgroups })
         };
         let pieces = instances.pieces.iter().enumerate().map(bound).collect::<Result<_>>()?;

@@ -9,9 +9,9 @@ use std::sync::{Arc, Weak};
 
 use crate::context::HizContext;
 use crate::error::Result;
+use crate::headless::ranges::{mask_bytes, pixel_ranges};
 use crate::host::threads::Locked;
 use crate::instances::Instances;
-use crate::instances::piece::Piece;
 use crate::output::outputs::Outputs;
 use crate::output::visible::Visible;
 
@@ -22,9 +22,9 @@ const MOST_BYTES: u64 = 1 << 24;
 /// Answers whose buffers are kept at most: they are looked through at each cull.
 const MOST_KEPT: usize = 64;
 
-/// The largest mask that the cull's own submit copies to a staging buffer: that of 8 million
-/// instances.
-const STAGED_MASK_BYTES: u64 = 1 << 20;
+/// What the cull's own submit copies to a staging buffer at most: the mask of 8 million instances,
+/// or the counts of pixels of 52,000.
+const STAGED_BYTES: u64 = 1 << 20;
 
 /// The buffers of one answer.
 #[derive(Debug)]
@@ -32,18 +32,22 @@ pub(super) struct AnswerBuffers {
     pub(super) visible: Arc<Visible>,
     /// Takes the copy of a mask that was asked for, unless it is large.
     pub(super) staging: Option<wgpu::Buffer>,
+    /// Takes the copy of counts of pixels, likewise.
+    pub(super) staging_pixels: Option<wgpu::Buffer>,
 }
 
 impl AnswerBuffers {
     fn new(context: &HizContext, instances: &Instances, outputs: &Outputs) -> Result<Self> {
         let visible = Arc::new(context.create_visible(instances, outputs)?);
-        let bytes: u64 = instances.pieces.iter().map(mask_bytes).sum();
-        let is_staged = outputs.mask && (1..=STAGED_MASK_BYTES).contains(&bytes);
         let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
-        let staging = is_staged
-            .then(|| context.gpu.empty("hiz.readback.staging", bytes, usage))
-            .transpose()?;
-        Ok(Self { visible, staging })
+        let staging = |is_asked: bool, bytes: u64| {
+            let is_staged = is_asked && (1..=STAGED_BYTES).contains(&bytes);
+            is_staged.then(|| context.gpu.empty("hiz.readback.staging", bytes, usage)).transpose()
+        };
+        let mask = instances.pieces.iter().map(mask_bytes).sum();
+        let pixels = pixel_ranges(instances, &visible).iter().map(|range| range.size).sum();
+        let staging_pixels = staging(outputs.pixels, pixels)?;
+        Ok(Self { staging: staging(outputs.mask, mask)?, staging_pixels, visible })
     }
 
     /// Lists start as 0xFFFFFFFF, which only new ones do.
@@ -52,13 +56,9 @@ impl AnswerBuffers {
     }
 
     fn bytes(&self) -> u64 {
-        self.visible.device_bytes() + self.staging.as_ref().map_or(0, wgpu::Buffer::size)
+        let staging = self.staging.iter().chain(&self.staging_pixels).map(wgpu::Buffer::size);
+        self.visible.device_bytes() + staging.sum::<u64>()
     }
-}
-
-/// Bytes of the mask of a piece.
-pub(super) fn mask_bytes(piece: &Piece) -> u64 {
-    4 * u64::from(piece.words())
 }
 
 /// The buffers of the last answers of an engine.

@@ -61,6 +61,7 @@ pub struct CullExtras<'a> {
 pub(super) struct Recorded {
     buffers: Arc<AnswerBuffers>,
     staged_mask: Option<Staged>,
+    staged_pixels: Option<Staged>,
     ahead: Option<Ahead>,
     pub(super) watch: Arc<Watch>,
 }
@@ -87,7 +88,7 @@ impl Question<'_> {
         let Self { instances, camera, pyramid, options, among } = *self;
         let visible = &buffers.visible;
         let mut refinement = Refinement::new(instances, camera, pyramid, options, visible, among)?;
-        let (mut staged_mask, mut ahead) = (None, None);
+        let (mut staged_mask, mut staged_pixels, mut ahead) = (None, None, None);
         match reading {
             Reading::Ahead => {
                 if let Some(refinement) = refinement.take() {
@@ -95,11 +96,14 @@ impl Question<'_> {
                 }
                 ahead = Some(Ahead::record(engine, encoder, instances, visible, options)?);
             }
-            Reading::Staged => staged_mask = Culling::stage_mask(encoder, instances, &buffers),
+            Reading::Staged => {
+                staged_mask = Culling::stage_mask(encoder, instances, &buffers);
+                staged_pixels = Culling::stage_pixels(encoder, instances, &buffers);
+            }
             Reading::Later => {}
         }
         let watch = Watch::new(refinement.map(|left| Box::new(left) as Box<dyn Refine>));
-        Ok(Recorded { buffers, staged_mask, ahead, watch })
+        Ok(Recorded { buffers, staged_mask, staged_pixels, ahead, watch })
     }
 
     /// The cull, once it is submitted.
@@ -109,7 +113,7 @@ impl Question<'_> {
         recorded: Recorded,
         submission: &Submission,
     ) -> Culling {
-        let Recorded { buffers, staged_mask, ahead, watch } = recorded;
+        let Recorded { buffers, staged_mask, staged_pixels, ahead, watch } = recorded;
         let Submission { index, at, done, timings, times } = submission.clone();
         Culling {
             engine: engine.clone(),
@@ -121,6 +125,7 @@ impl Question<'_> {
             visible: Arc::clone(&buffers.visible),
             buffers,
             staged_mask: Locked::new(staged_mask),
+            staged_pixels: Locked::new(staged_pixels),
             ahead,
             later: OnceLock::new(),
             watch,

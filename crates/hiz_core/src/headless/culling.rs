@@ -38,6 +38,9 @@ use crate::pyramid::Pyramid;
 /// It is over before a sleeping thread would have woken up (`docs/performance.md`).
 const ASKED_FOR: u32 = 1 << 14;
 
+/// The same of a cull with counts of pixels, which take ten times as long.
+const ASKED_FOR_PIXELS: u32 = 1 << 10;
+
 /// How long it is asked for.
 const ASKING: Duration = Duration::from_micros(200);
 
@@ -87,6 +90,8 @@ pub struct Culling {
     pub(super) visible: Arc<Visible>,
     /// The copy of a mask that is not large, made by the cull's own submit.
     pub(super) staged_mask: Locked<Option<Staged>>,
+    /// That of counts of pixels.
+    pub(super) staged_pixels: Locked<Option<Staged>>,
     /// What the cull's own submit copied, for [`Engine::cull_ahead`](Engine::cull_ahead).
     pub(super) ahead: Option<Ahead>,
     pub(super) later: OnceLock<Lists>,
@@ -120,7 +125,9 @@ impl Culling {
         let device = self.engine.device();
         self.engine.scoped(|| {
             let start = Instant::now();
-            while self.instances.len() <= ASKED_FOR && start.elapsed() < ASKING {
+            let asked_for =
+                if self.visible.outputs().pixels { ASKED_FOR_PIXELS } else { ASKED_FOR };
+            while self.instances.len() <= asked_for && start.elapsed() < ASKING {
                 if self.done.get().is_some() {
                     return Ok(());
                 }
@@ -153,11 +160,22 @@ impl Culling {
 
     /// Calls `use_bytes` with the words of the masks of all pieces.
     fn with_mask<T>(&self, use_bytes: impl FnOnce(&[&[u8]]) -> T) -> Result<T> {
+        let ranges = || mask_ranges(&self.instances, &self.visible);
+        self.with_staged(&self.staged_mask, ranges, use_bytes)
+    }
+
+    /// Calls `use_bytes` with the bytes of `ranges`, of which `staged` has a copy at first.
+    pub(super) fn with_staged<'a, T>(
+        &'a self,
+        staged: &Locked<Option<Staged>>,
+        ranges: impl FnOnce() -> Vec<BufferRange<'a>>,
+        use_bytes: impl FnOnce(&[&[u8]]) -> T,
+    ) -> Result<T> {
         self.engine.check_process()?;
         // The first reader takes the staged copy, and later readers copy again.
-        let Some(staged) = self.staged_mask.lock().take() else {
-            let words = self.read(&mask_ranges(&self.instances, &self.visible))?;
-            return Ok(use_bytes(&words.iter().map(Vec::as_slice).collect::<Vec<_>>()));
+        let Some(staged) = staged.lock().take() else {
+            let parts = self.read(&ranges())?;
+            return Ok(use_bytes(&parts.iter().map(Vec::as_slice).collect::<Vec<_>>()));
         };
         self.wait()?;
         let start = Instant::now();

@@ -1,9 +1,12 @@
 //! The counts of pixels of a submitted cull, on the host.
 
 use crate::error::Result;
+use crate::headless::answers::AnswerBuffers;
 use crate::headless::culling::Culling;
 use crate::headless::ranges::pixel_ranges;
+use crate::headless::readback::Staged;
 use crate::host::memory;
+use crate::instances::Instances;
 use crate::output::pixels::PixelCounts;
 
 impl Culling {
@@ -16,11 +19,27 @@ impl Culling {
     ///   [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn pixels(&self) -> Result<Vec<PixelCounts>> {
         self.require("pixels", self.visible.outputs().pixels)?;
-        let parts = self.read(&pixel_ranges(&self.instances, &self.visible))?;
         let mut counts = memory::list(self.instances.len() as usize, "pixels")?;
-        for part in parts {
-            counts.extend(bytemuck::pod_collect_to_vec::<u8, PixelCounts>(&part));
-        }
+        counts.resize(self.instances.len() as usize, PixelCounts::default());
+        let ranges = || pixel_ranges(&self.instances, &self.visible);
+        self.with_staged(&self.staged_pixels, ranges, |parts| {
+            let mut rest = bytemuck::cast_slice_mut(&mut counts);
+            for part in parts {
+                let (here, behind) = std::mem::take(&mut rest).split_at_mut(part.len());
+                here.copy_from_slice(part);
+                rest = behind;
+            }
+        })?;
         Ok(counts)
+    }
+
+    /// Records the copy of the counts into `buffers`, as [`Culling::stage_mask`] does.
+    pub(super) fn stage_pixels(
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        buffers: &AnswerBuffers,
+    ) -> Option<Staged> {
+        let staging = buffers.staging_pixels.clone()?;
+        Some(Staged::record(encoder, staging, &pixel_ranges(instances, &buffers.visible)))
     }
 }

@@ -3,7 +3,6 @@
 use crate::cull::groups::{is_grouped, tiers_of};
 use crate::cull::options::CullOptions;
 use crate::gpu::copies::BufferRange;
-use crate::headless::answers::mask_bytes;
 use crate::instances::Instances;
 use crate::instances::piece::Piece;
 use crate::output::bins::Arrangement;
@@ -58,6 +57,11 @@ pub(super) fn count_ranges<'a>(
     let statistics = visible.statistics().filter(|_| options.statistics);
     ranges.extend(statistics.map(|buffer| BufferRange::first(buffer, buffer.size())));
     ranges
+}
+
+/// Bytes of the mask of a piece.
+pub(super) fn mask_bytes(piece: &Piece) -> u64 {
+    4 * u64::from(piece.words())
 }
 
 /// The masks of all pieces.

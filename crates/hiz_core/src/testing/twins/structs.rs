@@ -110,7 +110,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "unoccluded" = unoccluded,
         }),
         twin!("Counting", CountingUniform {
-            "budget" = budget, "negligible" = negligible, "padding" = padding,
+            "budget" = budget, "negligible" = negligible, "ordered" = ordered, "padding" = padding,
         }),
         twin!("DrawIndexedIndirect", DrawIndexedIndirect {
             "index_count" = index_count, "instance_count" = instance_count,
