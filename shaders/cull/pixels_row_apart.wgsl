@@ -4,9 +4,10 @@
 // `end` is 0 for farthest depths, and `pyramid.nearest` for nearest ones.
 fn stored_row(end: u32, level: u32, q: u32, y: u32) -> vec4<u32> {
     let l = pyramid.levels[level];
-    let at = end + l.offset + y * l.stride + VECTOR * q;
+    let at = end + l.offset + y * l.stride + words_of(VECTOR * q);
     return vec4<u32>(
-        stored_bits(at), stored_bits(at + 1u), stored_bits(at + 2u), stored_bits(at + 3u));
+        stored_bits(at), stored_bits(at + words_of(1u)),
+        stored_bits(at + words_of(2u)), stored_bits(at + words_of(3u)));
 }
 
 // The nearest depths of these texels.

@@ -1,14 +1,14 @@
 // The depth pyramid: a list of texels in up to three storage bindings, the chunks.
 // The list begins with a header, whose first word is the number of the reduction that filled it.
 // The stored levels follow, one after the other, with padded rows.
-// Where both ends are stored, all levels of nearest depths follow those of farthest depths.
+// Where both ends are stored, the nearest depth of a texel follows its farthest.
 
 // Twin: `MAX_LEVELS` in `crates/hiz_core/src/pyramid/levels.rs`.
 const MAX_LEVELS: u32 = 16u;
 
 // Twin: `Level` in `crates/hiz_core/src/pyramid/levels.rs`.
 struct Level {
-    // In texels of the list; both are 0 for a level that is not stored.
+    // In words of the list; both are 0 for a level that is not stored.
     offset: u32,
     stride: u32,
     width: u32,
@@ -18,14 +18,14 @@ struct Level {
 // Twin: `PyramidUniform` in `crates/hiz_core/src/pyramid/mod.rs`.
 struct Pyramid {
     levels: array<Level, MAX_LEVELS>,
-    // .xy: where each level of farthest depths begins in an atlas; .zw: that of nearest depths.
+    // Where each level begins in an atlas.
     origins: array<vec4<u32>, MAX_LEVELS>,
-    // A chunk holds 1 << chunk_shift texels.
+    // A chunk holds 1 << chunk_shift words.
     chunk_shift: u32,
     // Which levels above 0 are stored; level 0 is the depth image.
     first_stored: u32,
     last_stored: u32,
-    // How far behind a level of farthest depths that of nearest depths lies, in texels of the list.
+    // How many words behind a farthest depth the nearest one lies.
     nearest: u32,
 }
 

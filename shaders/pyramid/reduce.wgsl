@@ -28,8 +28,8 @@ fn stored_quads(level: Level, x: u32, y: u32) -> Ends4 {
     let top = level.offset + min(2u * y, level.height - 1u) * level.stride;
     let bottom = level.offset + min(2u * y + 1u, level.height - 1u) * level.stride;
     return pairs_in_row(
-        halved(load_ends4(top + left), load_ends4(bottom + left)),
-        halved(load_ends4(top + right), load_ends4(bottom + right)));
+        halved(load_ends4(top + ENDS * left), load_ends4(bottom + ENDS * left)),
+        halved(load_ends4(top + ENDS * right), load_ends4(bottom + ENDS * right)));
 }
 
 // Four quads of a block: columns 4x to 4x + 3 of row y of quads.
@@ -41,7 +41,7 @@ fn quad_row(level: Level, x: u32, y: u32) -> Ends4 {
 }
 
 fn store_pair(level: Level, x: u32, y: u32, pair: Ends2) {
-    store_ends2(level.offset + y * level.stride + x, pair);
+    store_ends2(level.offset + y * level.stride + ENDS * x, pair);
 }
 
 // Reads a block of the level `source_number` and writes its texels of the levels after it, up to
@@ -49,7 +49,7 @@ fn store_pair(level: Level, x: u32, y: u32, pair: Ends2) {
 fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
     let source_level = pyramid.levels[source_number];
     let half = pyramid.levels[source_number + 1u];
-    let row = half.offset + BLOCK_QUADS * (block.y * half.stride + block.x);
+    let row = half.offset + BLOCK_QUADS * (block.y * half.stride + ENDS * block.x);
     // Two rows of quads at a time are a row of the level after the next.
     //
     // A loop keeps the code short, and is no slower on lavapipe.
@@ -79,7 +79,7 @@ fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
         }
     }
     let eighth = pyramid.levels[source_number + BLOCK_LOG2];
-    let index = eighth.offset + block.y * eighth.stride + block.x;
+    let index = eighth.offset + block.y * eighth.stride + ENDS * block.x;
     store_ends(index, joined4(pairs_in_row(q0, q1)));
 }
 

@@ -44,7 +44,8 @@ fn reduce_coarse(
     if !SHARED {
         let at = first_block() + place_of(group.xy, lane);
         if at.x < step.end.x && at.y < step.end.y {
-            store_ends(level.offset + at.y * level.stride + at.x, ends_of(at * side, side));
+            let index = level.offset + at.y * level.stride + ENDS * at.x;
+            store_ends(index, ends_of(at * side, side));
         }
         return;
     }
@@ -58,6 +59,6 @@ fn reduce_coarse(
         for (var i = 1u; i < WORKGROUP; i += 1u) {
             ends = joined(ends, parts[i]);
         }
-        store_ends(level.offset + texel.y * level.stride + texel.x, ends);
+        store_ends(level.offset + texel.y * level.stride + ENDS * texel.x, ends);
     }
 }

@@ -1,6 +1,9 @@
 // The levels of one end in the pyramid's list.
 // `store_both.wgsl` has the same functions for both ends.
 
+// Words of a texel.
+const ENDS: u32 = 1u;
+
 fn load_ends4(index: u32) -> Ends4 {
     return load4(index);
 }

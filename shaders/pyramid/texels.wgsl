@@ -3,8 +3,10 @@
 
 // The footprint has at most 2^n x 2^n texels.
 override FOOTPRINT_LOG2: u32;
-// True: the pyramid has nearest depths, too.
+// True: the pyramid has nearest depths, too, and they are asked for.
 override NEAREST: bool;
+// True: the pyramid has them, so a texel is two words.
+override BOTH: bool;
 
 @group(0) @binding(2) var<uniform> pyramid: Pyramid;
 @group(0) @binding(6) var<uniform> view_uniform: View;

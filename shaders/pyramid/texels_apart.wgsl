@@ -23,6 +23,11 @@ fn stored_bits(index: u32) -> u32 {
     }
 }
 
+// How many words so many texels of a row take.
+fn words_of(texels: u32) -> u32 {
+    return select(texels, 2u * texels, BOTH);
+}
+
 // The number of the reduction that filled the pyramid.
 fn reduction_number() -> u32 {
     return stored_bits(0u);
@@ -34,9 +39,11 @@ fn stored_corners(end: u32, level: u32, t: vec4<u32>) -> vec4<u32> {
     let l = pyramid.levels[level];
     let top = end + l.offset + t.y * l.stride;
     let bottom = end + l.offset + t.w * l.stride;
+    let left = words_of(t.x);
+    let right = words_of(t.z);
     return vec4<u32>(
-        stored_bits(top + t.x), stored_bits(top + t.z),
-        stored_bits(bottom + t.x), stored_bits(bottom + t.z));
+        stored_bits(top + left), stored_bits(top + right),
+        stored_bits(bottom + left), stored_bits(bottom + right));
 }
 
 // The same for any level; pixels of level 0 come as given.
@@ -54,7 +61,7 @@ fn nearest_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
 // A texel of a stored level; `end` as above.
 fn stored_texel(end: u32, level: u32, x: u32, y: u32) -> u32 {
     let l = pyramid.levels[level];
-    return stored_bits(end + l.offset + y * l.stride + x);
+    return stored_bits(end + l.offset + y * l.stride + words_of(x));
 }
 
 // The farthest depth of one texel of a level.

@@ -513,8 +513,8 @@ fn faults_of_both_ends_are_seen() {
         ("return Ends(range.y, range.x);", "return Ends(range.y, range.y);", Depths::Both, all),
         ("nearest4(v.near)", "farthest4(v.near)", Depths::Both, all),
         ("nearest(a.near, b.near)", "b.near", Depths::Both, StoredLevels::only(5)),
-        ("pyramid.nearest + index, ends.near)", "index, ends.near)", Depths::Both, all),
-        ("load4(pyramid.nearest + index)", "load4(index)", Depths::Both, all),
+        ("store(index + 1u, ends.near)", "store(index, ends.near)", Depths::Both, all),
+        ("vec4<u32>(left.yw, right.yw)", "vec4<u32>(left.xz, right.xz)", Depths::Both, all),
         ("vec4<u32>(a.near.xy, b.near.xy)", "vec4<u32>(a.near.xy, a.near.xy)", Depths::Both, all),
         (
             "return Ends(near_bits(), far_bits());",

@@ -214,7 +214,8 @@ fn particles_are_the_same_with_a_coarse_level() {
         ("ndc.z > nearest[view.nearest + word]", "ndc.z > farthest[view.farthest + word]"),
         ("ndc.z <= farthest[view.farthest + word]", "ndc.z <= nearest[view.nearest + word]"),
         ("all(last == texel) && ", ""),
-        ("texel.y * view.stride + texel.x;", "texel.y * view.stride + texel.x + 1u;"),
+        ("view.step * texel.x;", "texel.x;"),
+        ("view.step * texel.x;", "view.step * (texel.x + 1u);"),
     ];
     for fault in swapped {
         let found = run(2, true, &[fault]);

@@ -16,6 +16,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("ABSENT", FLAG),
     ("AMONG", FLAG),
     ("APPEND", FLAG),
+    ("BOTH", FLAG),
     ("BY_INDEX", FLAG),
     ("BY_ROWS", FLAG),
     ("CAPPED", FLAG),

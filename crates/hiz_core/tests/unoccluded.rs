@@ -348,6 +348,17 @@ fn near_and_far_one_texel_and_the_centre() {
     assert_red("the centre's depth", &rounds_of(DEPTH, SPHERES, PLAIN), &at_centre);
 }
 
+/// Both ends of a texel lie side by side, so a texel is two words, and the second one is nearest.
+#[test]
+fn the_ends_of_a_texel_are_told_apart() {
+    let posts = rounds_of(POSTS, BOXES, PLAIN);
+    let narrow = [("let left = words_of(t.x);", "let left = t.x;")];
+    assert_red("words taken for texels", &posts, &narrow);
+    let first = ("2u * column + end, BOTH", "2u * column, BOTH");
+    let found = total(&shown_by_class(&faulty(&[first]), &posts, Pipelines::Any));
+    assert!(found.false_claims > 0, "the atlas' farthest end taken for the nearest: {found:?}");
+}
+
 /// The walk down the nearest end asks for all texels of the rectangle, and for the frustum.
 #[test]
 fn the_walk_down_the_nearest_end_is_complete() {

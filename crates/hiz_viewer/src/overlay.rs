@@ -32,6 +32,8 @@ struct LevelView {
     nearest: f32,
     farthest: f32,
     is_image: u32,
+    step: u32,
+    padding: u32,
 }
 
 /// Twin: `shaders/copy.wgsl`, `Placement`.
@@ -125,6 +127,8 @@ impl Overlay {
             nearest: (2.0 * near).max(1.0) as f32,
             farthest: renderer.on_device.reach,
             is_image: u32::from(level == 0),
+            step: texels.as_ref().map_or(1, |t| t.step),
+            padding: 0,
         };
         let constants = gpu.buffer("viewer.level_view", &[constants], BufferUsages::UNIFORM);
         let texels = texels.as_ref().map_or(&self.no_texels, |t| t.buffer);

@@ -26,7 +26,7 @@ struct View {
     farthest: u32,
     nearest: u32,
     stride: u32,
-    padding: u32,
+    step: u32,
 }
 
 /// What is drawn.
@@ -90,7 +90,7 @@ pub(crate) fn run(
         farthest: farthest.first,
         nearest: nearest.first,
         stride: farthest.stride,
-        padding: 0,
+        step: farthest.step,
     };
     let view = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: Some("particles.view"),

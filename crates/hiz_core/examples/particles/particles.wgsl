@@ -26,7 +26,7 @@ struct View {
     farthest: u32,
     nearest: u32,
     stride: u32,
-    padding: u32,
+    step: u32,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -95,7 +95,7 @@ fn draw(@builtin(global_invocation_id) id: vec3<u32>) {
     var undecided = 1u;
     if COARSE {
         let texel = pixel >> vec2<u32>(view.level);
-        let word = texel.y * view.stride + texel.x;
+        let word = texel.y * view.stride + view.step * texel.x;
         let before_all = ndc.z > nearest[view.nearest + word];
         let behind_all = ndc.z <= farthest[view.farthest + word];
         // The pixels of a soft test have to lie in the texel, too.

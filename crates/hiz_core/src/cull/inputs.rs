@@ -158,6 +158,7 @@ impl PreparedView {
             fit_volume: options.fit == Fit::Volume,
             among: inputs.among.is_some(),
             nearest: pyramid.has_nearest(),
+            both: pyramid.depths().count() > 1,
             receivers: options.shadow.is_some(),
             decision: if options.shadow.is_some() { Decision::Shadow } else { Decision::Seen },
         };

@@ -31,6 +31,8 @@ pub(crate) struct CullKey {
     pub(crate) among: bool,
     /// Whether the pyramid has nearest depths, too, so that an instance may surely show.
     pub(crate) nearest: bool,
+    /// Whether it has them, asked for or not.
+    pub(crate) both: bool,
     /// Whether the pyramid leaves out background.
     pub(crate) receivers: bool,
     /// What is decided about an instance.
@@ -96,6 +98,7 @@ impl CullKey {
             fit_volume: false,
             among: false,
             nearest: false,
+            both: false,
             receivers: false,
             decision: Decision::Seen,
         }
@@ -294,7 +297,7 @@ pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::SampledQuads),
 ];
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 10] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 11] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
@@ -306,6 +309,7 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 10] {
         ("FIT_VOLUME", flag(key.fit_volume && !key.kind.is_point())),
         ("AMONG", flag(key.among)),
         ("NEAREST", flag(key.nearest)),
+        ("BOTH", flag(key.both)),
         ("RECEIVERS", flag(key.receivers)),
     ]
 }

@@ -157,8 +157,10 @@ impl Engine {
             return memory::collected(to_u32(&bytes).zip(told).map(depth), "level");
         }
         let (width, stride) = (layout.width as usize, layout.stride as usize);
-        let of_end = if end == DepthEnd::Nearest { pyramid.layout.nearest } else { 0 };
-        let first = u64::from(layout.offset) + u64::from(of_end);
+        // Of both ends, the nearest depth of a texel follows its farthest.
+        let of_end = if end == DepthEnd::Nearest { pyramid.layout.nearest as usize } else { 0 };
+        let ends = pyramid.depths().count() as usize;
+        let first = u64::from(layout.offset);
         let count = u64::from(layout.stride) * u64::from(layout.height);
         let chunk = 1_u64 << pyramid.layout.chunk_shift;
         let ranges: Vec<_> = (first / chunk..=(first + count - 1) / chunk)
@@ -176,7 +178,8 @@ impl Engine {
             self.scoped(|| readback::read_buffers(self.device(), self.queue(), &ranges))?.concat();
         let mut texels = memory::list(width * layout.height as usize, "level")?;
         for row in bytes.chunks_exact(4 * stride) {
-            texels.extend(to_u32(&row[..4 * width]).map(f32::from_bits));
+            let words = to_u32(&row[..4 * ends * width]);
+            texels.extend(words.skip(of_end).step_by(ends).map(f32::from_bits));
         }
         Ok(texels)
     }

@@ -156,13 +156,10 @@ impl Atlas {
         });
         for (k, level) in layout.stored_levels() {
             let Level { offset, stride, width, height } = *level;
+            let width = layout.depths.count() as u32 * width;
             let rows = Rows { offset: 4 * u64::from(offset), pitch: 4 * stride, width, height };
-            let [x, y, x_nearest, y_nearest] = layout.atlas.origins[k];
+            let [x, y, ..] = layout.atlas.origins[k];
             self.record_rows(encoder, stored, [x, y], rows);
-            if layout.nearest > 0 {
-                let offset = rows.offset + 4 * u64::from(layout.nearest);
-                self.record_rows(encoder, stored, [x_nearest, y_nearest], Rows { offset, ..rows });
-            }
         }
         let Some(staging) = staging else {
             encoder.copy_texture_to_texture(
@@ -223,7 +220,7 @@ fn staging_bytes(size: ImageSize) -> u64 {
     u64::from(staging_pitch(size)) * u64::from(size.height)
 }
 
-/// Rows in a buffer: `offset` and `pitch` in bytes, `width` in pixels.
+/// Rows in a buffer: `offset` and `pitch` in bytes, `width` in words.
 #[derive(Clone, Copy)]
 struct Rows {
     offset: u64,
@@ -251,11 +248,13 @@ mod tests {
     fn levels_lie_beside_each_other() {
         for (w, h) in [(1, 1), (5, 3), (1, 9000), (9000, 1), (1920, 1080), (640, 481), (8191, 8001)]
         {
-            for levels in
-                [StoredLevels::ALL, StoredLevels::only(3), StoredLevels { first: 2, last: 4 }]
+            let choices =
+                [StoredLevels::ALL, StoredLevels::only(3), StoredLevels { first: 2, last: 4 }];
+            let ends = [(Depths::Farthest, 1), (Depths::Both, 2)];
+            for (levels, (depths, words)) in
+                choices.into_iter().flat_map(|levels| ends.map(|ends| (levels, ends)))
             {
-                let layout =
-                    PyramidLayout::new(ImageSize::new(w, h), levels, Depths::Farthest, 25).unwrap();
+                let layout = PyramidLayout::new(ImageSize::new(w, h), levels, depths, 25).unwrap();
                 let atlas = &layout.atlas;
                 // Column, row, width and height of each area; the headers have the last columns.
                 let mut areas = vec![
@@ -265,12 +264,12 @@ mod tests {
                 ];
                 for (k, level) in layout.stored_levels() {
                     let [x, y, ..] = atlas.origins[k];
-                    areas.push([x, y, level.width.div_ceil(4), level.height]);
+                    areas.push([x, y, (words * level.width).div_ceil(4), level.height]);
                 }
                 for (i, [x, y, width, height]) in areas.iter().enumerate() {
                     assert!(
                         x + width <= atlas.width && y + height <= atlas.height,
-                        "{w}x{h} {levels:?}"
+                        "{w}x{h} {levels:?} {depths:?}"
                     );
                     for [u, v, across, down] in &areas[..i] {
                         assert!(

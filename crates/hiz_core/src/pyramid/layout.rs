@@ -23,33 +23,28 @@ pub(crate) const HEADERS: u32 = 2;
 ///
 /// - Level 0 is on the left.
 /// - The stored levels are to its right, below each other.
-/// - Where both ends are stored, the levels of nearest depths are to the right of these.
+/// - Where both ends are stored, the nearest depth of a texel follows its farthest.
 /// - Two headers have the last two columns: the number of the reduction whose depth image level 0
 ///   is, and the number of the reduction that made the stored levels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct AtlasLayout {
     pub(crate) width: u32,
     pub(crate) height: u32,
-    /// Column and row where each level begins: that of farthest depths, then that of nearest ones.
+    /// Column and row where each level begins, and padding.
     pub(crate) origins: [[u32; 4]; MAX_LEVELS],
 }
 
 impl AtlasLayout {
     pub(crate) fn new(levels: &[Level], stored: StoredLevels, depths: Depths) -> Self {
-        let texels = |level: &Level| level.width.div_ceil(PIXELS);
+        let texels = |level: &Level| (depths.count() as u32 * level.width).div_ceil(PIXELS);
         let mut origins = [[0; 4]; MAX_LEVELS];
-        let column = texels(&levels[0]);
+        let column = levels[0].width.div_ceil(PIXELS);
         let (mut width, mut rows) = (0, 0);
         for (k, level) in stored_levels(levels, stored) {
             origins[k] = [column, rows, 0, 0];
             width = width.max(texels(level));
             rows += level.height;
         }
-        for (k, _) in stored_levels(levels, stored).filter(|_| depths.has_nearest()) {
-            let [x, y, ..] = origins[k];
-            origins[k] = [x, y, x + if depths.has_farthest() { width } else { 0 }, y];
-        }
-        let width = width * depths.count() as u32;
         Self { width: column + width + HEADERS, height: levels[0].height.max(rows), origins }
     }
 
@@ -67,15 +62,15 @@ pub(crate) const PYRAMID_CHUNKS: usize = 3;
 /// Columns of blocks come in multiples of this, so that the reduction loads and stores vectors.
 pub(crate) const BLOCK_ALIGNMENT: u32 = 4;
 
-/// Rows of every level start at multiples of this many texels, as copies into a texture require.
+/// Rows of every level start at multiples of this many words, as copies into a texture require.
 const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4;
 
-/// Texels before level 1.
+/// Words before level 1.
 ///
 /// The first one holds the number of the reduction that filled the pyramid.
 /// A cull that expects another number keeps everything: its reduction was not submitted before it.
 /// Buffers start as 0, which is never a number of a reduction.
-const HEADER_TEXELS: u64 = 4;
+const HEADER_WORDS: u64 = 4;
 
 /// The side in texels, as a power of two, of the block that an invocation of the reduction reads.
 ///
@@ -127,19 +122,19 @@ pub(crate) struct PyramidLayout {
     pub(crate) steps: Vec<Step>,
     /// Which depths are stored.
     pub(crate) depths: Depths,
-    /// How far behind a level of farthest depths that of nearest depths lies, in texels; 0 where one
-    /// of them is stored alone.
+    /// How many words behind a farthest depth the nearest one lies; 0 where one of them is stored
+    /// alone.
     pub(crate) nearest: u32,
-    /// Texels of the header and of the stored levels, padding included.
+    /// Words of the header and of the stored levels, padding included.
     pub(crate) texels: u64,
-    /// A chunk holds `1 << chunk_shift` texels.
+    /// A chunk holds `1 << chunk_shift` words.
     pub(crate) chunk_shift: u32,
     /// Where the levels lie in an atlas.
     pub(crate) atlas: AtlasLayout,
 }
 
 impl PyramidLayout {
-    /// The layout for an image of `size`, with chunks of `1 << chunk_shift` texels.
+    /// The layout for an image of `size`, with chunks of `1 << chunk_shift` words.
     ///
     /// # Errors
     /// [`Error::Invalid`] for levels out of range;
@@ -169,7 +164,8 @@ impl PyramidLayout {
             last: stored.last.min(coarsest),
         };
         let steps = passes(&levels, stored);
-        let mut texels = HEADER_TEXELS;
+        let ends = depths.count() as u32;
+        let mut texels = HEADER_WORDS;
         let offset = |texels: u64| {
             u32::try_from(texels)
                 .map_err(|_| Error::limit("pyramid texels", texels, u64::from(u32::MAX)))
@@ -178,16 +174,13 @@ impl PyramidLayout {
             for k in step.first..=step.last {
                 let level = &mut levels[k as usize];
                 let [stride, rows] = step.blocks.map(|n| n * step.texels_a_block(k));
-                level.stride = stride.next_multiple_of(ROW_ALIGNMENT);
+                level.stride = (ends * stride).next_multiple_of(ROW_ALIGNMENT);
                 level.offset = offset(texels)?;
                 texels += u64::from(level.stride) * u64::from(rows);
             }
         }
         let steps = with_tail(&levels, steps);
-        // The second end has the same places behind the first.
-        let of_one = texels - HEADER_TEXELS;
-        let nearest = if depths.count() > 1 { offset(of_one)? } else { 0 };
-        texels += u64::from(nearest);
+        let nearest = ends - 1;
         offset(texels)?;
         let atlas = AtlasLayout::new(&levels, stored, depths);
         let layout =
@@ -212,7 +205,7 @@ impl PyramidLayout {
         stored_levels(&self.levels, self.stored)
     }
 
-    /// Texels of each chunk.
+    /// Words of each chunk.
     pub(crate) fn chunk_sizes(&self) -> Vec<u64> {
         let chunk = 1_u64 << self.chunk_shift;
         let count = self.texels.div_ceil(chunk);
@@ -268,7 +261,7 @@ fn passes(levels: &[Level], stored: StoredLevels) -> Vec<Step> {
     steps
 }
 
-/// How many texels of 4 bytes one storage binding may hold, as a power of two of at most 30.
+/// How many words of 4 bytes one storage binding may hold, as a power of two of at most 30.
 pub(crate) fn chunk_shift(limits: &wgpu::Limits) -> u32 {
     let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).max(4);
     (bytes / 4).ilog2().min(30)
@@ -300,10 +293,12 @@ mod tests {
 
     #[test]
     fn levels_do_not_overlap_and_rows_are_aligned() {
-        for (w, h) in [(7, 5), (1023, 769), (1, 17), (640, 360)] {
+        for ((w, h), (depths, words)) in [(7, 5), (1023, 769), (1, 17), (640, 360)]
+            .into_iter()
+            .flat_map(|size| [(Depths::Farthest, 1), (Depths::Both, 2)].map(|ends| (size, ends)))
+        {
             let layout =
-                PyramidLayout::new(ImageSize::new(w, h), StoredLevels::ALL, Depths::Farthest, 25)
-                    .unwrap();
+                PyramidLayout::new(ImageSize::new(w, h), StoredLevels::ALL, depths, 25).unwrap();
             let mut end = 4;
             for level in &layout.levels[1..] {
                 assert!(
@@ -311,7 +306,7 @@ mod tests {
                         && level.offset.is_multiple_of(4)
                         && level.stride.is_multiple_of(64)
                 );
-                assert!(level.stride >= level.width);
+                assert!(level.stride >= words * level.width);
                 end = level.offset + level.stride * level.height;
             }
             assert!(u64::from(end) <= layout.texels);

@@ -7,7 +7,7 @@ use crate::pyramid::Pyramid;
 ///
 /// Each is a float32 of NDC depth: the farthest of a block of `2^level` by `2^level` pixels, or the
 /// nearest ([`Pyramid::nearest_texels`]).
-/// Texel `(x, y)` is word `first + y * stride + x` of the buffer, with row 0 on top.
+/// Texel `(x, y)` is word `first + y * stride + step * x` of the buffer, with row 0 on top.
 /// The words are those of the last reduction that has run.
 ///
 /// # Examples
@@ -23,7 +23,7 @@ use crate::pyramid::Pyramid;
 /// let pyramid = engine.pyramid(&engine.upload_depth(&[0.5; 16 * 8], &camera)?)?;
 /// let level = pyramid.level_texels(1).expect("it is stored");
 /// assert_eq!((level.size.width, level.size.height), (8, 4));
-/// assert!(level.stride >= 8);
+/// assert!(level.stride >= 8 && level.step == 1);
 /// assert!(pyramid.level_texels(0).is_none()); // the depth image itself
 /// assert!(pyramid.nearest_texels(1).is_none()); // `Depths::Both` stores them, too
 /// # Ok::<(), hiz_core::Error>(())
@@ -36,6 +36,9 @@ pub struct LevelTexels<'a> {
     pub first: u32,
     /// Words from row to row.
     pub stride: u32,
+    /// Words from texel to texel of a row: 2 where the pyramid has both ends, which lie side by
+    /// side, and otherwise 1.
+    pub step: u32,
     /// Columns and rows.
     pub size: ImageSize,
 }
@@ -63,14 +66,14 @@ impl Pyramid {
         self.texels_of(level, self.layout.nearest)
     }
 
-    /// The texels of a level that begin `behind` words behind its first ones.
+    /// The texels of a level that lie `behind` words behind its first ones.
     fn texels_of(&self, level: u32, behind: u32) -> Option<LevelTexels<'_>> {
         if level == 0 || !self.layout.is_there(level) {
             return None;
         }
         let found = self.layout.levels.get(level as usize)?;
         let first = found.offset + behind;
-        let last = first + found.stride * found.height - 1;
+        let last = found.offset + found.stride * found.height - 1;
         let [chunk, other] = [first, last].map(|word| word >> self.layout.chunk_shift);
         if chunk != other {
             return None;
@@ -79,6 +82,7 @@ impl Pyramid {
             buffer: &self.chunks[chunk as usize],
             first: first - (chunk << self.layout.chunk_shift),
             stride: found.stride,
+            step: self.layout.depths.count() as u32,
             size: ImageSize::new(found.width, found.height),
         })
     }

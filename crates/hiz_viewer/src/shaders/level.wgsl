@@ -17,6 +17,8 @@ struct LevelView {
     farthest: f32,
     // 1: level 0, which is the depth image itself.
     is_image: u32,
+    // Words from texel to texel.
+    step: u32,
 }
 
 @group(0) @binding(0) var<uniform> level: LevelView;
@@ -29,7 +31,7 @@ fn level_fragment(@builtin(position) p: vec4<f32>) -> @location(0) vec4<f32> {
     if level.is_image == 1u {
         depth = farthest_of_image(vec2<i32>(texel));
     } else {
-        depth = texels[level.offset + texel.y * level.stride + texel.x];
+        depth = texels[level.offset + texel.y * level.stride + level.step * texel.x];
     }
     let distance = level.b / max(depth - level.a, 1e-12);
     if distance > 4.0 * level.farthest {

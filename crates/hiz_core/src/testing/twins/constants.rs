@@ -215,6 +215,8 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/refine", &["REFINED"]),
     ("cull/shadow", &["NO_FACE"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
+    ("pyramid/store_both", &["ENDS"]),
+    ("pyramid/store_one", &["ENDS"]),
     (
         "pyramid/receiver_mask",
         &[
@@ -504,6 +506,7 @@ fn a_cull_sets_every_override() {
             fit_volume: false,
             among: false,
             nearest: false,
+            both: false,
             receivers: false,
             decision: Decision::Seen,
         };
