@@ -1,6 +1,6 @@
 //! Locks, and work that is split between threads.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::available_parallelism;
 
@@ -78,16 +78,48 @@ pub(crate) fn on_threads<T: Send>(
             work(part);
         }
     };
-    let helpers = if threads > 1 { helpers() } else { None };
+    let wanted = if threads > 1 { threads.min(cores()) } else { 0 };
+    let taken = Taken::new(wanted);
+    let helpers = if taken.0 > 0 { helpers() } else { None };
     let Some(helpers) = helpers else { return run() };
     helpers.in_place_scope(|scope| {
-        (0..threads.min(cores())).for_each(|_| scope.spawn(|_| run()));
+        (0..taken.0).for_each(|_| scope.spawn(|_| run()));
         run();
     });
 }
 
+/// So many helpers, taken until this is dropped.
+///
+/// No more are taken than there are, so none has to end the work of another call first.
+/// Where all are taken, a call works alone: it never waits for another one.
+struct Taken(usize);
+
+/// How many helpers are taken by all calls together.
+static TAKEN: AtomicUsize = AtomicUsize::new(0);
+
+impl Taken {
+    /// As many as there are left, up to `wanted`.
+    fn new(wanted: usize) -> Self {
+        let mut taken = 0;
+        let _ = TAKEN.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |all| {
+            taken = wanted.min(cores().saturating_sub(all));
+            Some(all + taken)
+        });
+        Self(taken)
+    }
+}
+
+impl Drop for Taken {
+    fn drop(&mut self) {
+        TAKEN.fetch_sub(self.0, Ordering::Relaxed);
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use std::sync::Barrier;
+    use std::sync::atomic::AtomicBool;
+
     use super::*;
 
     #[test]
@@ -101,4 +133,32 @@ mod tests {
         }
         on_threads(cores(), std::iter::empty::<usize>(), |_| unreachable!());
     }
+
+    /// Else a short call would wait for a long one, and for what that one waits for.
+    #[test]
+    fn a_call_does_not_wait_for_another_one() {
+        let (begun, may_end) = (Barrier::new(2), Barrier::new(2));
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                // Each thread that takes a part waits for the second call to end.
+                let first = AtomicBool::new(true);
+                on_threads(cores() + 1, 0..64, |_| {
+                    if first.swap(false, Ordering::Relaxed) {
+                        begun.wait();
+                        may_end.wait();
+                    } else {
+                        while !IS_OVER.load(Ordering::Relaxed) {
+                            std::thread::yield_now();
+                        }
+                    }
+                });
+            });
+            begun.wait();
+            on_threads(cores(), 0..8, |_| ());
+            IS_OVER.store(true, Ordering::Relaxed);
+            may_end.wait();
+        });
+    }
+
+    static IS_OVER: AtomicBool = AtomicBool::new(false);
 }
