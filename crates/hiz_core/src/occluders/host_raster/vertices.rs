@@ -137,8 +137,8 @@ impl Vertices {
         }
     }
 
-    /// Finds the triangles in `groups` of `meshlet` that may cover a centre in these columns and rows, from
-    /// the first to the last.
+    /// Finds the triangles in `groups` of `meshlet` that may cover a centre in these columns and
+    /// rows, from the first to the last.
     pub(super) fn select(
         &mut self,
         blocks: &Blocks,
