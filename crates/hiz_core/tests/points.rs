@@ -353,9 +353,8 @@ fn a_single_cull_keeps_spheres_of_radius_0_as_a_resident_one_does() {
                 ..CullOptions::default()
             };
             let once = engine.cull_once(&spheres, &camera, &pyramid, &options).unwrap();
-            let culling = engine
-                .cull(&instances, &camera, &pyramid, &options, &Outputs::default())
-                .unwrap();
+            let culling =
+                engine.cull(&instances, &camera, &pyramid, &options, &Outputs::default()).unwrap();
             assert!(once.mask == culling.mask().unwrap(), "{coverage:?} {guard_px:?}");
             assert!(once.mask[large], "{coverage:?} {guard_px:?}");
             let first = &culling.verdicts().unwrap()[..once.first_counts.tested as usize];

@@ -90,7 +90,8 @@ pub(crate) struct Engine(pub(crate) Held<headless::Engine>, LastRequest);
 impl Engine {
     #[new]
     fn new(py: Python<'_>, adapter: Option<&str>) -> PyResult<Self> {
-        detached(py, || open(adapter)).map(|engine| Self(Held::new(py, engine), LastRequest::default()))
+        detached(py, || open(adapter))
+            .map(|engine| Self(Held::new(py, engine), LastRequest::default()))
     }
 
     fn adapter(&self, py: Python<'_>) -> PyResult<Summary> {

@@ -117,10 +117,8 @@ impl Engine {
         let options = CullOptions { hierarchy, statistics: false, ..options.clone() };
         // Spheres of radius 0 take a third less time as points, which have half of the records.
         // Their guard is that of spheres.
-        let of_points = CullOptions {
-            guard_px: Some(options.guard_of(BoundsKind::Sphere)),
-            ..options.clone()
-        };
+        let of_points =
+            CullOptions { guard_px: Some(options.guard_of(BoundsKind::Sphere)), ..options.clone() };
         #[allow(clippy::needless_update, reason = "`testing` adds a field")]
         let upload = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
         let mut answer =
