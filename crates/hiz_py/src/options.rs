@@ -39,7 +39,14 @@ impl Request {
 /// Culls in a row mostly have the same two objects, which are frozen and have two dozen fields.
 /// A lock, which is held only together with the interpreter lock.
 #[derive(Default)]
-pub(crate) struct LastRequest(Mutex<Option<(Py<PyAny>, Py<PyAny>, Request)>>);
+pub(crate) struct LastRequest(Mutex<Option<Answered>>);
+
+/// A request with its options and outputs.
+struct Answered {
+    options: Py<PyAny>,
+    outputs: Py<PyAny>,
+    request: Request,
+}
 
 impl LastRequest {
     /// [`Request::new`] without meshes, which the last one may answer.
@@ -50,15 +57,16 @@ impl LastRequest {
     ) -> PyResult<Request> {
         // The lock is taken twice, because reading a field may let another thread run.
         let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((last_options, last_outputs, request)) = &*lock()
-            && last_options.is(options)
-            && last_outputs.is(outputs)
+        if let Some(last) = &*lock()
+            && last.options.is(options)
+            && last.outputs.is(outputs)
         {
-            return Ok(request.clone());
+            return Ok(last.request.clone());
         }
         let request = Request::new(options, outputs, None)?;
-        let of = (options.clone().unbind(), outputs.clone().unbind(), request.clone());
-        let before = lock().replace(of);
+        let [options, outputs] = [options, outputs].map(|object| object.clone().unbind());
+        let before = lock().replace(Answered { options, outputs, request: request.clone() });
+        // Without the lock, because objects that are let go of may run code of theirs.
         drop(before);
         Ok(request)
     }
