@@ -115,7 +115,8 @@ impl Engine {
             chosen => chosen,
         };
         let options = CullOptions { hierarchy, statistics: false, ..options.clone() };
-        // Spheres of radius 0 take a third less time as points, which have half of the records.
+        // Spheres of radius 0 take three quarters of the time as points, whose records have half of
+        // the bytes.
         // Their guard is that of spheres.
         let of_points =
             CullOptions { guard_px: Some(options.guard_of(BoundsKind::Sphere)), ..options.clone() };
