@@ -188,3 +188,23 @@ def test_an_unknown_keyword_is_told_the_closest_one(wrong: str, closest: str) ->
     # The keywords of outputs are the cull's alone.
     with pytest.raises(TypeError, match=r"^capacity: expected no such parameter"):
         hizvk.visible(BOUNDS, CAMERA, depth=np.ones((8, 8)), kind="z", capacity=1)  # type: ignore[call-arg]
+
+
+def test_culls_in_turns_have_each_their_own_options() -> None:
+    """What a device remembers of the last request answers the same two objects alone."""
+    device = hizvk.Device()
+    pyramid = device.pyramid(np.full((8, 8), 5.0), CAMERA, kind="z")
+    crowd = device.instances(BOUNDS)
+    plain, slack = hizvk.CullOptions(), hizvk.CullOptions(depth_slack=0.5)
+    assert device.cull(crowd, CAMERA, pyramid, plain).mask.tolist() == [True, False]
+    for _ in range(2):
+        assert device.cull(crowd, CAMERA, pyramid, slack).mask.tolist() == [True, True]
+        assert device.cull(crowd, CAMERA, pyramid, plain).mask.tolist() == [True, False]
+        only = device.cull(crowd, CAMERA, pyramid, plain, ["indices"])
+        assert only.indices.tolist() == [0]
+        with pytest.raises(ValueError, match="outputs: expected"):
+            _ = only.mask
+    # Objects that were made and dropped one after the other may lie at the same place.
+    for relative, expected in [(0.0, [True, False]), (0.5, [True, True])] * 8:
+        options = hizvk.CullOptions(depth_slack=relative)
+        assert device.cull(crowd, CAMERA, pyramid, options).mask.tolist() == expected

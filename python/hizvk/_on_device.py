@@ -100,6 +100,8 @@ def owned(
     name: str, thing: object, wanted: type[_Thing], expected: str, hint: str = "", *, device: object
 ) -> _Thing:
     """An object of this class that `device` has made; see `_arguments.instance`."""
+    if isinstance(thing, wanted) and thing._device is device:
+        return thing  # as nearly always
     found = _arguments.instance(name, thing, wanted, expected, hint)
     check_owner(name, found, device)
     return found

@@ -37,7 +37,8 @@ def culled(
     `restriction` is what `among_of` made of ``among``, and `table` has the meshes of `outputs`.
     """
     pyramid = checked_pyramid(device, camera, pyramid)
-    check_coverage(options, pyramid)
+    if options.coverage == "sample":
+        check_coverage(options, pyramid)
     culling = device._engine.cull(
         instances._inner,
         camera._inner,

@@ -746,11 +746,11 @@ class Device(StaysInProcess):
         """
         owned("instances", instances, Instances, *SOME_INSTANCES, device=self)
         options, outputs = cull_request(options, outputs, keywords, self.cull)
-        wait = _arguments.flag("wait", wait)
-        restriction = among_of(among, instances, self)
+        wait = wait is True or _arguments.flag("wait", wait)
+        restriction = None if among is None else among_of(among, instances, self)
         request = options, outputs, restriction, wait
         if isinstance(camera, Camera):
-            table = self._mesh_table(outputs.meshes)
+            table = None if outputs.meshes is None else self._mesh_table(outputs.meshes)
             return culled(self, instances, camera, pyramid, *request, table)
         return culled_views(self, instances, camera, pyramid, *request)
 

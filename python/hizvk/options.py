@@ -529,16 +529,16 @@ def cull_request(
     options: object, outputs: object, keywords: Mapping[str, Any], of: Callable[..., object]
 ) -> tuple[CullOptions, Outputs]:
     """Both objects of a cull, from what `of` was given, such as `Device.cull`."""
-    of_outputs: dict[str, Any] = {}
-    of_options: Mapping[str, Any] = keywords
     if keywords:
         _arguments.refuse_unknown(keywords, CullKeywords.__annotations__, of)
-        names = ("pixel_budget", "capacity", "draw", "meshes", "emit", "placement")
-        of_outputs = {name: keywords[name] for name in names if name in keywords}
-        of_options = {name: keywords[name] for name in keywords if name not in of_outputs}
     if outputs is None:
         outputs = _OUTPUTS
     made = outputs if isinstance(outputs, Outputs) else _outputs_of(outputs)
+    if options is None and not keywords:
+        return _OPTIONS, made  # as most culls are asked
+    names = ("pixel_budget", "capacity", "draw", "meshes", "emit", "placement")
+    of_outputs = {name: keywords[name] for name in names if name in keywords}
+    of_options = {name: keywords[name] for name in keywords if name not in of_outputs}
     chosen = cull_options(options, of_options, of, lists_levels=True)
     if of_outputs:
         made = _replaced(made, of_outputs)

@@ -186,9 +186,9 @@ def among_of(
     among: _AmongLike | None, instances: Instances, device: object
 ) -> npt.NDArray[np.bool_] | CoreCulling | CoreViews | None:
     """What `among` names, as the compiled module takes it."""
-    count = len(instances)
     if among is None:
         return None
+    count = len(instances)
     if isinstance(among, PassResult):
         check_owner("among", among, device)
         among = among.mask

@@ -134,4 +134,5 @@ def _single(run: Run) -> None:
             f"visible of {len(points):,} spheres of radius 0 / numba's z-test on one thread",
             ms["visible, spheres of radius 0"],
             ms["numba, points"],
+            3.0,
         )

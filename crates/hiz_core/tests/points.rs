@@ -310,6 +310,65 @@ fn points_pass_everywhere_where_spheres_do() {
     }
 }
 
+/// Spheres of radius 0 pass through a single cull as points, with the guard of spheres.
+///
+/// One sphere has a size: its own part of 65,536 is culled as spheres.
+#[test]
+fn a_single_cull_keeps_spheres_of_radius_0_as_a_resident_one_does() {
+    let engine = engine();
+    let camera = camera_along_z(SIZE.0, SIZE.1, DepthConvention::Standard);
+    let mut random = Random(11);
+    let image: Vec<f32> = (0..SIZE.0 * SIZE.1)
+        .map(|i| ndc(if i / 8 % 3 == 0 { 3.0 } else { 9.0 }, DepthConvention::Standard))
+        .collect();
+    let pyramid = engine.pyramid(&engine.upload_depth(&image, &camera).unwrap()).unwrap();
+    let (count, large) = (140_000, 100_000);
+    let mut positions: Vec<f64> = (0..3 * count).map(|_| random.range(-6.0, 12.0)).collect();
+    positions[3 * 70] = f64::NAN;
+    positions[3 * 71 + 2] = 1e19;
+    // Behind the nearer stripes, and so large that it shows beside them.
+    positions[3 * large..3 * large + 3].copy_from_slice(&[0.5, 0.5, 5.0]);
+    let singles: Vec<f32> = positions.iter().map(|v| *v as f32).collect();
+    let mut radii = vec![0.0; count];
+    radii[3] = -0.0;
+    radii[large] = 2.0;
+    let narrow: Vec<f32> = radii.iter().map(|r| *r as f32).collect();
+    for (centers, radii) in [
+        (Floats::F64(&positions), Floats::F64(&radii)),
+        (Floats::F32(&singles), Floats::F32(&narrow)),
+        (Floats::F32(&singles), Floats::F64(&radii)),
+    ] {
+        let spheres = Bounds::Spheres { centers, radii };
+        let instances = engine.instances(&spheres, &InstanceOptions::default()).unwrap();
+        for (coverage, guard_px) in [
+            (Coverage::Area, None),
+            (Coverage::Area, Some(0.5)),
+            (Coverage::Sample, None),
+            (Coverage::Sample, Some(1.0)),
+        ] {
+            let options = CullOptions {
+                coverage,
+                guard_px,
+                hierarchy: Hierarchy::Never,
+                ..CullOptions::default()
+            };
+            let once = engine.cull_once(&spheres, &camera, &pyramid, &options).unwrap();
+            let culling =
+                engine.cull(&instances, &camera, &pyramid, &options, &Outputs::default()).unwrap();
+            assert!(once.mask == culling.mask().unwrap(), "{coverage:?} {guard_px:?}");
+            assert!(once.mask[large], "{coverage:?} {guard_px:?}");
+            let first = &culling.verdicts().unwrap()[..once.first_counts.tested as usize];
+            let told = |verdict| first.iter().filter(|one| **one == verdict).count() as u64;
+            let counts = once.first_counts;
+            assert_eq!(
+                [counts.invalid, counts.occluded, counts.visible],
+                [Verdict::Invalid, Verdict::Occluded, Verdict::Visible].map(told)
+            );
+            assert!(counts.invalid == 2 && counts.occluded > 100 || coverage == Coverage::Sample);
+        }
+    }
+}
+
 /// The named outcomes, worked out by hand: a wall at depth 4, the eye at the origin.
 #[test]
 fn named_outcomes() {

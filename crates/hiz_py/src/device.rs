@@ -20,7 +20,7 @@ use crate::camera::Camera;
 use crate::culling::{Counts, Culling, StageTime, ViewsCulling, stage_time};
 use crate::held::{Held, OnDevice, detached};
 use crate::meshes::{LodNumbers, MeshTable, mesh_table};
-use crate::options::{Request, cull_options, mip_options};
+use crate::options::{LastRequest, Request, cull_options, mip_options};
 
 /// The depth of a single cull.
 #[derive(FromPyObject)]
@@ -84,13 +84,14 @@ fn chosen<'a>(mask: Option<&'a PyReadonlyArray1<'_, bool>>) -> PyResult<Only<'a>
 
 /// A device with its queue and pipelines.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Engine(pub(crate) Held<headless::Engine>);
+pub(crate) struct Engine(pub(crate) Held<headless::Engine>, LastRequest);
 
 #[pymethods]
 impl Engine {
     #[new]
     fn new(py: Python<'_>, adapter: Option<&str>) -> PyResult<Self> {
-        detached(py, || open(adapter)).map(|engine| Self(Held::new(py, engine)))
+        detached(py, || open(adapter))
+            .map(|engine| Self(Held::new(py, engine), LastRequest::default()))
     }
 
     fn adapter(&self, py: Python<'_>) -> PyResult<Summary> {
@@ -400,7 +401,10 @@ impl Engine {
         ahead: bool,
     ) -> PyResult<Culling> {
         let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
-        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
+        let Request { options, outputs } = match &meshes {
+            None => self.1.or_new(options, outputs)?,
+            meshes => Request::new(options, outputs, meshes.as_deref())?,
+        };
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let among = among.as_ref().map(|among| HeldAmong::new(py, among)).transpose()?;
         let cull = |engine: &headless::Engine| {

@@ -2,6 +2,8 @@
 //!
 //! The struct expressions name every field, so that an option without its line does not compile.
 
+use std::sync::{Mutex, PoisonError};
+
 use hiz_core::{
     Coverage, CullOptions, DirectionalLight, DrawTemplate, Fit, Footprint, Hierarchy, LodRule,
     MeshTable, MipDepths, MipLookup, MipOptions, Order, Outputs,
@@ -13,6 +15,7 @@ use pyo3::types::PyAny;
 use crate::meshes::emit;
 
 /// What a cull is asked, taken whole from the two Python objects.
+#[derive(Clone)]
 pub(crate) struct Request {
     pub(crate) options: CullOptions,
     pub(crate) outputs: Outputs,
@@ -28,6 +31,44 @@ impl Request {
         let options = cull_options(options)?;
         let outputs = self::outputs(outputs, options.order, meshes)?;
         Ok(Self { options, outputs })
+    }
+}
+
+/// The last request without meshes, and the objects that it was taken from.
+///
+/// Culls in a row mostly have the same two objects, which are frozen and have two dozen fields.
+/// A lock, which is held only together with the interpreter lock.
+#[derive(Default)]
+pub(crate) struct LastRequest(Mutex<Option<Answered>>);
+
+/// A request with its options and outputs.
+struct Answered {
+    options: Py<PyAny>,
+    outputs: Py<PyAny>,
+    request: Request,
+}
+
+impl LastRequest {
+    /// [`Request::new`] without meshes, which the last one may answer.
+    pub(crate) fn or_new(
+        &self,
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
+    ) -> PyResult<Request> {
+        // The lock is taken twice, because reading a field may let another thread run.
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(last) = &*lock()
+            && last.options.is(options)
+            && last.outputs.is(outputs)
+        {
+            return Ok(last.request.clone());
+        }
+        let request = Request::new(options, outputs, None)?;
+        let [options, outputs] = [options, outputs].map(|object| object.clone().unbind());
+        let before = lock().replace(Answered { options, outputs, request: request.clone() });
+        // Without the lock, because objects that are let go of may run code of theirs.
+        drop(before);
+        Ok(request)
     }
 }
 

@@ -34,20 +34,15 @@ pub(crate) fn begin_mask_module() -> Source {
     ]])
 }
 
-/// The passes around the test of a piece's members.
-pub(super) struct FullMask {
+/// The pipelines of the passes around the test of members.
+#[derive(Debug, Clone)]
+pub(super) struct FullMaskPipelines {
     begin: wgpu::ComputePipeline,
-    survivors: wgpu::BindGroup,
     settle: wgpu::ComputePipeline,
-    verdicts: wgpu::BindGroup,
 }
 
-impl FullMask {
-    pub(super) fn new(
-        gpu: &Gpu,
-        (key, report): (&CullKey, &ReportKey),
-        output: &GroupOutput,
-    ) -> Result<Self> {
+impl FullMaskPipelines {
+    pub(super) fn new(gpu: &Gpu, key: &CullKey, report: &ReportKey) -> Result<Self> {
         let begin_layout = gpu.layout("hiz.begin_mask.layout", BEGIN_BINDINGS)?;
         let settle_layout = gpu.layout("hiz.settle_groups.layout", SETTLE_BINDINGS)?;
         let records = gpu.layout("hiz.cull.instances_layout", RECORD_BINDINGS)?;
@@ -57,7 +52,7 @@ impl FullMask {
             label: "hiz.begin_mask.pipeline",
             source: begin_mask_module(),
             entry_point: "begin_mask",
-            layouts: &[begin_layout.clone(), records.clone(), written.clone()],
+            layouts: &[begin_layout, records.clone(), written.clone()],
             constants: &[("LOOKS_AT_ACCEPTED", flag(looks))],
         })?;
         let members = gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?;
@@ -66,19 +61,38 @@ impl FullMask {
             label: "hiz.settle_groups.pipeline",
             source: settle_groups_module(key.store, key.kind, report.emit),
             entry_point: "settle_groups",
-            layouts: &[settle_layout.clone(), records, written, members],
+            layouts: &[settle_layout, records, written, members],
             constants: &[&classify_constants(key)[..], &report_constants(report), &[absent]]
                 .concat(),
         })?;
+        Ok(Self { begin, settle })
+    }
+}
+
+/// The passes around the test of a piece's members.
+pub(super) struct FullMask {
+    pipelines: FullMaskPipelines,
+    survivors: wgpu::BindGroup,
+    verdicts: wgpu::BindGroup,
+}
+
+impl FullMask {
+    pub(super) fn new(
+        gpu: &Gpu,
+        pipelines: FullMaskPipelines,
+        output: &GroupOutput,
+    ) -> Result<Self> {
         let survivors = made(&output.begin_bindings, || {
+            let layout = gpu.layout("hiz.begin_mask.layout", BEGIN_BINDINGS)?;
             let survivors = output.tiers[0].survivors.as_entire_binding();
-            gpu.bind_group("hiz.begin_mask.survivors", &begin_layout, &[entry(0, survivors)])
+            gpu.bind_group("hiz.begin_mask.survivors", &layout, &[entry(0, survivors)])
         })?;
         let verdicts = made(&output.settle_bindings, || {
+            let layout = gpu.layout("hiz.settle_groups.layout", SETTLE_BINDINGS)?;
             let verdicts = output.verdicts.as_entire_binding();
-            gpu.bind_group("hiz.settle_groups.verdicts", &settle_layout, &[entry(1, verdicts)])
+            gpu.bind_group("hiz.settle_groups.verdicts", &layout, &[entry(1, verdicts)])
         })?;
-        Ok(Self { begin, survivors: survivors.clone(), settle, verdicts: verdicts.clone() })
+        Ok(Self { pipelines, survivors: survivors.clone(), verdicts: verdicts.clone() })
     }
 
     /// Records the choice, between the tests of groups and of members.
@@ -86,14 +100,14 @@ impl FullMask {
     /// The piece's records and outputs are bound.
     /// `words`: those of the mask, or 0 if nothing is to run.
     pub(super) fn record_begin(&self, pass: &mut wgpu::ComputePass<'_>, words: u32) {
-        pass.set_pipeline(&self.begin);
+        pass.set_pipeline(&self.pipelines.begin);
         pass.set_bind_group(0, &self.survivors, &[]);
         pass.dispatch_workgroups(words.div_ceil(WORKGROUP * WORDS_OF_INVOCATION), 1, 1);
     }
 
     /// Sets what settles the members of whole groups; the dispatch is indirect.
     pub(super) fn set_settle(&self, pass: &mut wgpu::ComputePass<'_>) {
-        pass.set_pipeline(&self.settle);
+        pass.set_pipeline(&self.pipelines.settle);
         pass.set_bind_group(0, &self.verdicts, &[]);
     }
 }

@@ -3,7 +3,9 @@
 //! In large pieces upper tiers of boxes go first, from the topmost one down.
 //! Each tier's survivors are the arguments of an indirect dispatch, which tests what they hold.
 
-use crate::cull::full_mask::FullMask;
+use std::sync::Arc;
+
+use crate::cull::full_mask::{FullMask, FullMaskPipelines};
 use crate::cull::options::{CullOptions, Hierarchy};
 use crate::cull::pipelines::{
     CullKey, FramePass, MEMBER_BINDINGS, ReportKey, accept_members_pipeline, cull_boxes_pipeline,
@@ -72,15 +74,43 @@ pub(crate) fn is_grouped(piece: &Piece, options: &CullOptions) -> bool {
     tiers_of(piece, options) > 0
 }
 
-/// The pipelines and bindings of the cull of a piece in groups.
-pub(super) struct GroupCull<'a> {
+/// The pipelines of culls in groups.
+#[derive(Debug, Clone)]
+struct GroupPipelines {
     /// The tests of the boxes of each tier, the topmost one last.
-    tiers: Vec<TierCull<'a>>,
+    boxes: Vec<wgpu::ComputePipeline>,
     /// The test of the members of the surviving groups.
     members: wgpu::ComputePipeline,
     /// What keeps the members of accepted groups; `None` where no group can be accepted.
     accept: Option<wgpu::ComputePipeline>,
-    /// The passes of a mask that may begin full, in place of `accept`.
+    /// In place of `accept`, where a mask may begin full.
+    full: Option<FullMaskPipelines>,
+}
+
+impl GroupPipelines {
+    fn new(gpu: &Gpu, (key, report): (&CullKey, &ReportKey), tiers: usize) -> Result<Self> {
+        let boxes = |tier: usize| {
+            // Upper tiers do not ask which instances are wanted.
+            let key = CullKey { among: key.among && tier == 0, ..group_key(*key) };
+            cull_boxes_pipeline(gpu, &key, report, (tier as u32, tier + 1 == tiers))
+        };
+        let flips = report.flips();
+        let accepts = key.nearest && !key.sample_coverage && !flips;
+        Ok(Self {
+            boxes: (0..tiers).map(boxes).collect::<Result<_>>()?,
+            members: cull_members_pipeline(gpu, &key.of_instances(report), report)?,
+            accept: accepts.then(|| accept_members_pipeline(gpu, key, report)).transpose()?,
+            full: flips.then(|| FullMaskPipelines::new(gpu, key, report)).transpose()?,
+        })
+    }
+}
+
+/// The pipelines and bindings of the cull of a piece in groups.
+pub(super) struct GroupCull<'a> {
+    /// The tests of the boxes of each tier, the topmost one last.
+    tiers: Vec<TierCull<'a>>,
+    pipelines: Arc<GroupPipelines>,
+    /// The passes of a mask that may begin full.
     full: Option<FullMask>,
 }
 
@@ -128,36 +158,31 @@ impl<'a> GroupCull<'a> {
         output: &'a GroupOutput,
         survivors: &[wgpu::BindGroup],
     ) -> Result<Self> {
-        let boxes =
-            output.tiers.iter().zip(survivors).enumerate().map(|(tier, (output, bound))| {
-                let list = made(&output.list_bindings, || {
-                    gpu.bind_group(
-                        "hiz.cull.survivors",
-                        &gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?,
-                        &[
-                            entry(0, output.survivors.as_entire_binding()),
-                            entry(1, wgpu::BindingResource::TextureView(&output.survivor_list)),
-                        ],
-                    )
-                })?;
-                // Upper tiers do not ask which instances are wanted.
-                let key = CullKey { among: key.among && tier == 0, ..group_key(key) };
-                let is_top = tier + 1 == survivors.len();
-                Ok(TierCull {
-                    output,
-                    pipeline: cull_boxes_pipeline(gpu, &key, &report, (tier as u32, is_top))?,
-                    outputs: bound.clone(),
-                    list: list.clone(),
-                })
-            });
+        let tiers = survivors.len();
+        let pipelines = gpu.known.get((key, report, tiers), || {
+            GroupPipelines::new(gpu, (&key, &report), tiers).map(Arc::new)
+        })?;
+        let boxes = output.tiers.iter().zip(survivors).zip(&pipelines.boxes);
+        let boxes = boxes.map(|((output, bound), pipeline)| {
+            let list = made(&output.list_bindings, || {
+                gpu.bind_group(
+                    "hiz.cull.survivors",
+                    &gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?,
+                    &[
+                        entry(0, output.survivors.as_entire_binding()),
+                        entry(1, wgpu::BindingResource::TextureView(&output.survivor_list)),
+                    ],
+                )
+            })?;
+            let (outputs, list) = (bound.clone(), list.clone());
+            Ok(TierCull { output, pipeline: pipeline.clone(), outputs, list })
+        });
         let tiers = boxes.collect::<Result<_>>()?;
-        let flips = report.flips();
-        let accepts = key.nearest && !key.sample_coverage && !flips;
+        let full = pipelines.full.clone();
         Ok(Self {
             tiers,
-            members: cull_members_pipeline(gpu, &key.of_instances(&report), &report)?,
-            accept: accepts.then(|| accept_members_pipeline(gpu, &key, &report)).transpose()?,
-            full: flips.then(|| FullMask::new(gpu, (&key, &report), output)).transpose()?,
+            full: full.map(|pipelines| FullMask::new(gpu, pipelines, output)).transpose()?,
+            pipelines,
         })
     }
 
@@ -203,9 +228,9 @@ impl<'a> GroupCull<'a> {
         }
         pass.set_bind_group(0, view, &[]);
         pass.set_bind_group(3, &groups.list, &[]);
-        pass.set_pipeline(&self.members);
+        pass.set_pipeline(&self.pipelines.members);
         pass.dispatch_workgroups_indirect(&groups.output.survivors, 0);
-        if let Some(accept) = &self.accept {
+        if let Some(accept) = &self.pipelines.accept {
             pass.set_pipeline(accept);
         } else if let Some(full) = &self.full {
             full.set_settle(pass);

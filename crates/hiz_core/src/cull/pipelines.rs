@@ -610,8 +610,10 @@ pub(crate) fn cull_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let module = flat_module(key.store, key.kind, key.decision, (report.emit, report.pass));
-    flat_pipeline(gpu, "hiz.cull.pipeline", module, key, report)
+    gpu.known.get((*key, *report), || {
+        let module = flat_module(key.store, key.kind, key.decision, (report.emit, report.pass));
+        flat_pipeline(gpu, "hiz.cull.pipeline", module, key, report)
+    })
 }
 
 /// The cull of the boxes of a tier; of all of them if it is the topmost one.

@@ -62,6 +62,18 @@ pub(crate) fn packed([column, row]: [u32; 2]) -> u32 {
     column | row << COORDINATE_BITS
 }
 
+impl CullOptions {
+    /// The guard of a cull of instances of `kind`, in pixels.
+    pub(crate) fn guard_of(&self, kind: BoundsKind) -> f64 {
+        match (self.guard_px, self.coverage) {
+            (Some(given), _) => given,
+            (None, coverage) if kind.is_point() => GUARD_OF_POINTS + coverage.own_reach(),
+            (None, Coverage::Area) => 0.0,
+            (None, Coverage::Sample) => 1.0 / 64.0,
+        }
+    }
+}
+
 impl ViewUniform {
     #[expect(
         clippy::cast_possible_truncation,
@@ -93,12 +105,7 @@ impl ViewUniform {
         let DepthTolerance { relative: slack, absolute: slack_abs } = tolerance.after(of_caller);
         range("descent", f64::from(options.descent), 65_536.0)?;
         let kappa = range("transform_slack", options.transform_slack, 1e6)?;
-        let guard = match (options.guard_px, options.coverage) {
-            (Some(g), _) => range("guard_px", g, 16.0)?,
-            (None, coverage) if kind.is_point() => GUARD_OF_POINTS + coverage.own_reach(),
-            (None, Coverage::Area) => 0.0,
-            (None, Coverage::Sample) => 1.0 / 64.0,
-        };
+        let guard = range("guard_px", options.guard_of(kind), 16.0)?;
         if (guard * 256.0).fract() != 0.0 {
             return Err(Error::invalid(
                 "guard_px",

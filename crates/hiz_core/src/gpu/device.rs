@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 use crate::gpu::checked::checked;
-use crate::gpu::kept::{Kept, KeptBuffers, Ring};
+use crate::gpu::kept::{Kept, KeptBuffers, Known, Ring};
 use crate::gpu::layouts::{Binding, Layouts};
 use crate::gpu::made::Making;
 use crate::gpu::pipelines::{Compute, Depth, Pipelines};
@@ -45,6 +45,8 @@ pub(crate) struct Gpu {
     sampler: wgpu::Sampler,
     pub(super) layouts: Layouts,
     pub(super) pipelines: Pipelines,
+    /// What the stages keep.
+    pub(crate) known: Known,
     pub(super) buffers: KeptBuffers,
     pub(super) ring: Ring,
     /// Staging buffers by their size; see [`Gpu::kept_staging`].
@@ -77,6 +79,7 @@ impl Gpu {
             sampler,
             layouts: Layouts::default(),
             pipelines: Pipelines::default(),
+            known: Known::default(),
             buffers: KeptBuffers::default(),
             ring: Ring::new(STAGING_KEPT),
             staging: Kept::new(STAGING_SIZES),

@@ -1,6 +1,8 @@
 //! Objects that are made once and kept: buffers by label, and the last values by key.
 
+use std::any::{Any, TypeId};
 use std::collections::HashMap;
+use std::hash::Hash;
 use std::sync::Arc;
 
 use crate::error::Result;
@@ -62,6 +64,38 @@ impl Ring {
             }
         });
     }
+}
+
+/// What stages have made, by keys of their own types.
+///
+/// A stage keeps here what takes microseconds to look up part by part, such as its pipelines.
+#[derive(Debug, Default)]
+pub(crate) struct Known(Locked<Maps>);
+
+/// A `HashMap<K, V>` for the type of each `(K, V)`.
+type Maps = HashMap<TypeId, Box<dyn Any + Send>>;
+
+impl Known {
+    /// The value with this key, made by `make` on first use.
+    pub(crate) fn get<K: Any + Send + Eq + Hash, V: Any + Send + Clone>(
+        &self,
+        key: K,
+        make: impl FnOnce() -> Result<V>,
+    ) -> Result<V> {
+        if let Some(found) = map_of::<K, V>(&mut self.0.lock()).get(&key) {
+            return Ok(found.clone());
+        }
+        // Without the lock, because a driver may compile here.
+        let made = make()?;
+        map_of(&mut self.0.lock()).insert(key, made.clone());
+        Ok(made)
+    }
+}
+
+fn map_of<K: Any + Send, V: Any + Send>(maps: &mut Maps) -> &mut HashMap<K, V> {
+    let map =
+        maps.entry(TypeId::of::<(K, V)>()).or_insert_with(|| Box::new(HashMap::<K, V>::new()));
+    map.downcast_mut().expect("a map of these types")
 }
 
 /// The last values that were asked for, each with the key that identifies it.

@@ -113,6 +113,12 @@ fn backends() -> wgpu::Backends {
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = backends();
+    // wgpu checks the arguments of an indirect dispatch by a dispatch of its own.
+    // Those of a cull in groups are counted by this crate's shaders, at most one for each box of a
+    // piece, which `Piece` keeps within the device's limits.
+    // A debug build checks them all the same.
+    let checks = wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
+    descriptor.flags.set(checks, cfg!(debug_assertions));
     wgpu::Instance::new(descriptor)
 }
 

@@ -228,6 +228,7 @@ impl Engine {
     }
 
     /// The device.
+    /// In a release build it does not check the arguments of indirect draws and dispatches.
     pub fn device(&self) -> &wgpu::Device {
         &self.shared.device
     }

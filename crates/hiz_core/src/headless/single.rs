@@ -18,7 +18,7 @@ use crate::headless::depth_image::DepthImage;
 use crate::headless::engine::Engine;
 use crate::headless::kept_depth::KeptDepth;
 use crate::host::memory;
-use crate::input::bounds::Bounds;
+use crate::input::bounds::{Bounds, BoundsKind};
 use crate::input::camera::Camera;
 use crate::input::depth::DepthInput;
 use crate::instances::InstanceOptions;
@@ -115,6 +115,11 @@ impl Engine {
             chosen => chosen,
         };
         let options = CullOptions { hierarchy, statistics: false, ..options.clone() };
+        // Spheres of radius 0 take three quarters of the time as points, whose records have half of
+        // the bytes.
+        // Their guard is that of spheres.
+        let of_points =
+            CullOptions { guard_px: Some(options.guard_of(BoundsKind::Sphere)), ..options.clone() };
         #[allow(clippy::needless_update, reason = "`testing` adds a field")]
         let upload = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
         let mut answer =
@@ -125,12 +130,16 @@ impl Engine {
                 answer.take(&mut on_device)?;
             }
             let part = bounds.part(&(start..count.min(start + PART)));
+            let (part, options) = match part.as_points() {
+                Some(points) => (points, &of_points),
+                None => (part, &options),
+            };
             let outputs = Outputs { mask: true, verdicts: start == 0, ..Outputs::NONE };
             let has_groups = options.hierarchy == Hierarchy::Always;
             // One submission for both: each takes as long as thousands of tests.
             let (instances, copies) = self.instances_for_one(&part, &upload, has_groups)?;
             let question =
-                Question { instances: &instances, camera, pyramid, options: &options, among: None };
+                Question { instances: &instances, camera, pyramid, options, among: None };
             let extras = CullExtras::default();
             let culling = self.cull_after(copies, &question, &outputs, Reading::Staged, &extras)?;
             on_device.push_back(culling);

@@ -232,6 +232,16 @@ impl<'a> Bounds<'a> {
         }
     }
 
+    /// The points that these are, if they are spheres and all radii are 0.
+    pub(crate) fn as_points(&self) -> Option<Self> {
+        let Self::Spheres { centers, radii } = *self else { return None };
+        let is_point = match radii {
+            Floats::F32(radii) => radii.iter().all(|r| *r == 0.0),
+            Floats::F64(radii) => radii.iter().all(|r| *r == 0.0),
+        };
+        is_point.then_some(Self::Points { positions: centers })
+    }
+
     /// Whether there are no instances.
     ///
     /// # Errors
