@@ -673,6 +673,7 @@ impl Pane {
             let column = if self.left > 0 { first + own_column - shifted } else { own_column };
             let block = (&mut *lines, wide, column);
             match self.state(tile) {
+                CLEAR => fill(block, depth_of, |_| [0.0; SIDE]),
                 PIXELS => {
                     let first = row * SIDE * self.stride + own_column * SIDE;
                     fill(
