@@ -13,8 +13,9 @@
 //! A wrong answer could lose an occluder; it could not hide what can be seen.
 //!
 //! Which side is outside tells the sign of the volume.
-//! Lobes that are inside out are looked for along lines: how deep a line is inside of the part must
-//! never fall below 0.
+//! A part whose triangles all face away from one point has no lobe that is inside out.
+//! Elsewhere such lobes are looked for along lines: how deep a line is inside of the part must never
+//! fall below 0.
 //! None of it depends on the order of the triangles.
 
 use crate::error::Result;
@@ -86,17 +87,28 @@ impl ClosedParts {
         let mut parts = memory::list(ends.len(), "parts")?;
         // By part as it was found: its number among those that stay.
         let mut stays = memory::list(ends.len(), "parts")?;
+        let mut lines = Lines::default();
         let mut begin = 0;
         for end in ends {
             let own = &by_part[begin..end];
             begin = end;
-            let corners = |i: u32| triangles[i as usize].map(|v| positions[v as usize]);
-            let number = |i: u32| {
-                let [a, b, c] = triangles[i as usize].map(|v| numbers[v as usize]);
-                a.wrapping_add(b).wrapping_add(c)
+            let corners = |i: u32| {
+                let [a, b, c] = triangles[i as usize];
+                [positions[a as usize], positions[b as usize], positions[c as usize]]
             };
-            let part =
-                solid(own, corners).filter(|part| is_never_inside_out(own, corners, number, part));
+            let number = |i: u32| {
+                let [a, b, c] = triangles[i as usize];
+                let sum = numbers[a as usize].wrapping_add(numbers[b as usize]);
+                sum.wrapping_add(numbers[c as usize])
+            };
+            let part = solid(own, corners)
+                .filter(|Solid { part, is_star }| {
+                    *is_star
+                        || (0..3).all(|axis| {
+                            lines.find_nothing_inside_out(axis, own, corners, number, part)
+                        })
+                })
+                .map(|solid| solid.part);
             stays.push(part.map_or(OPEN, |_| parts.len() as u32));
             parts.extend(part);
         }
@@ -107,12 +119,6 @@ impl ClosedParts {
             *part = stays[*part as usize];
         }
         Ok(Self { part_of, parts })
-    }
-
-    /// The part that a triangle belongs to; `None` if it is not closed.
-    #[inline]
-    pub(crate) fn part_of(&self, triangle: u32) -> Option<&ClosedPart> {
-        self.parts.get(self.number_of(triangle)? as usize)
     }
 
     /// The number of the part that a triangle belongs to; `None` if it is not closed.
@@ -127,7 +133,7 @@ impl ClosedParts {
     }
 }
 
-/// A number for a position that looks random (finalizers of Appleby's MurmurHash3).
+/// A number for a position that looks random (finalizers of Appleby's `MurmurHash3`).
 fn mixed(p: Vec3) -> u64 {
     let mut number = 0x9E37_79B9_7F4A_7C15_u64;
     for x in p {
@@ -183,7 +189,8 @@ fn connected(numbers: &[u64], triangles: &[[u32; 3]]) -> Result<(Forest, Vec<boo
     // The border about each vertex: what comes next, less what came before.
     let mut borders = filled(count, 0_u64)?;
     for triangle in triangles {
-        let [a, b, c] = triangle.map(|v| numbers[v as usize]);
+        let [a, b, c] = *triangle;
+        let [a, b, c] = [numbers[a as usize], numbers[b as usize], numbers[c as usize]];
         for (v, edges) in
             triangle.iter().zip([b.wrapping_sub(c), c.wrapping_sub(a), a.wrapping_sub(b)])
         {
@@ -232,141 +239,182 @@ fn weld(numbers: &[u64], borders: &mut [u64], forest: &mut Forest) -> Result<()>
     Ok(())
 }
 
+/// What is known of a part before lines are tried.
+struct Solid {
+    part: ClosedPart,
+    /// Whether all of its triangles face away from one point.
+    ///
+    /// Then it is a sum of tetrahedra from there that all have its sense, so no lobe of it is
+    /// inside out.
+    is_star: bool,
+}
+
 /// A part with its box and its sense; `None` where the sign of its volume is not sure.
-fn solid(own: &[u32], corners: impl Fn(u32) -> [Vec3; 3]) -> Option<ClosedPart> {
+fn solid(own: &[u32], corners: impl Fn(u32) -> [Vec3; 3]) -> Option<Solid> {
     let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for p in own.iter().flat_map(|i| corners(*i)) {
+    for i in own {
+        let [a, b, c] = corners(*i);
         for k in 0..3 {
-            min[k] = min[k].min(p[k]);
-            max[k] = max[k].max(p[k]);
+            min[k] = least(min[k], least(least(a[k], b[k]), c[k]));
+            max[k] = greatest(max[k], greatest(greatest(a[k], b[k]), c[k]));
         }
     }
-    let middle: Vec3 = std::array::from_fn(|k| 0.5 * (min[k] + max[k]));
+    let middle = [0, 1, 2].map(|k: usize| 0.5 * (min[k] + max[k]));
     let (mut volume, mut size) = (0.0, 0.0);
+    let (mut smallest, mut largest) = (0.0, 0.0);
     for i in own {
-        let [a, b, c] = corners(*i).map(|p| sub(p, middle));
-        volume += dot(a, cross(b, c));
-        // More than the sizes of the product's terms.
-        size += [a, b, c].map(|p| p[0].abs() + p[1].abs() + p[2].abs()).iter().product::<f64>();
+        let [a, b, c] = corners(*i);
+        let (along, across) = (sub(b, a), sub(c, a));
+        let term = dot(sub(a, middle), cross(along, across));
+        volume += term;
+        let length = |p: Vec3| p[0].abs() + p[1].abs() + p[2].abs();
+        size += length(along) * length(across);
+        (smallest, largest) = (least(smallest, term), greatest(largest, term));
     }
-    // A sum of n terms rounds by less than n epsilon times their sizes.
+    // A term rounds by a few epsilon times the product of these lengths, and their sum by one for
+    // each of them.
+    size *= (0..3).map(|k| max[k] - min[k]).sum::<f64>();
     let is_sure = volume.abs() > size * (own.len() as f64 + 64.0) * f64::EPSILON;
-    (is_sure && size.is_finite()).then_some(ClosedPart {
-        min,
-        max,
-        sense: if volume > 0.0 { 1 } else { -1 },
+    (is_sure && size.is_finite()).then_some(Solid {
+        part: ClosedPart { min, max, sense: if volume > 0.0 { 1 } else { -1 } },
+        is_star: smallest == 0.0 || largest == 0.0,
     })
 }
 
-/// Lines along each axis through triangles of a part.
-const LINES: usize = 8;
-/// Triangles that lines go through.
-const SAMPLES: usize = 12;
-
-/// Lines along one axis: where they are along the next one, and along the one after that.
-#[derive(Default)]
-struct Lines {
-    count: usize,
-    at: [[f64; LINES]; 2],
+/// `a` where it is less, else `b`: one instruction, unlike `f64::min`.
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
-/// Whether no line that was tried runs through a lobe of the part that is inside out.
-///
-/// A lobe's triangles have it on their outside, so the lines go through some triangles of the part:
-/// those with the least of random numbers.
-fn is_never_inside_out(
+#[inline(always)]
+fn greatest(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// How many lines are tried along each axis.
+const LINES: usize = 4;
+
+/// Lines along an axis that run through a part.
+#[derive(Default)]
+struct Lines {
+    /// Where they cross it: which line, where along it, and whether it enters.
+    crossings: Vec<(usize, f64, bool)>,
+}
+
+impl Lines {
+    /// Whether no line along `axis` that was tried runs through a lobe of the part that is inside
+    /// out.
+    ///
+    /// A lobe's triangles have it on their outside.
+    /// So the lines go through some triangles of the part: those with the least of random numbers.
+    fn find_nothing_inside_out(
+        &mut self,
+        axis: usize,
+        own: &[u32],
+        corners: impl Fn(u32) -> [Vec3; 3],
+        number: impl Fn(u32) -> u64,
+        part: &ClosedPart,
+    ) -> bool {
+        let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+        let corners_of = |i: u32| {
+            let [a, b, c] = corners(i);
+            [[a[u], a[v]], [b[u], b[v]], [c[u], c[v]]]
+        };
+        let at = places(own, corners_of, number);
+        let ClosedPart { min, max, sense } = part;
+        let tied = 1e-9 * (max[axis] - min[axis]);
+        self.crossings.clear();
+        // A line that meets an edge tells nothing.
+        let mut is_void = [false; LINES];
+        for i in own {
+            let [a, b, c] = corners_of(*i);
+            let ends =
+                |k: usize| (least(least(a[k], b[k]), c[k]), greatest(greatest(a[k], b[k]), c[k]));
+            let ((left, right), (low, high)) = (ends(0), ends(1));
+            let mut is_near = [false; LINES];
+            for l in 0..LINES {
+                is_near[l] = (left <= at[0][l])
+                    & (at[0][l] <= right)
+                    & (low <= at[1][l])
+                    & (at[1][l] <= high);
+            }
+            if is_near == [false; LINES] {
+                continue;
+            }
+            for l in (0..LINES).filter(|l| is_near[*l]) {
+                let from = |p: [f64; 2]| [p[0] - at[0][l], p[1] - at[1][l]];
+                let (a, b, c) = (from(a), from(b), from(c));
+                // The same numbers for both triangles of an edge, up to their signs.
+                let [p, q, r] = [turn(b, c), turn(c, a), turn(a, b)];
+                let is_up = (p >= 0.0) & (q >= 0.0) & (r >= 0.0);
+                if !is_up && !((p <= 0.0) & (q <= 0.0) & (r <= 0.0)) {
+                    continue;
+                }
+                is_void[l] |= (p == 0.0) | (q == 0.0) | (r == 0.0);
+                let [a, b, c] = corners(*i);
+                let (a, b, c) = (a[axis], b[axis], c[axis]);
+                let place = (p * a + q * b + r * c) / (p + q + r);
+                let enters = is_up == (*sense < 0);
+                // Faces that touch are entered first.
+                self.crossings.push((l, if enters { place - tied } else { place }, enters));
+            }
+        }
+        self.crossings
+            .sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(b.2.cmp(&a.2)));
+        let (mut depth, mut last) = (0, 0);
+        self.crossings.iter().all(|(line, _, enters)| {
+            if *line != last {
+                (depth, last) = (0, *line);
+            }
+            depth += if *enters { 1 } else { -1 };
+            depth >= 0 || is_void[*line]
+        })
+    }
+}
+
+/// Twice the area of a triangle whose third corner is the origin.
+fn turn(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// Where lines run: through some of the triangles.
+fn places(
     own: &[u32],
-    corners: impl Fn(u32) -> [Vec3; 3],
+    corners: impl Fn(u32) -> [[f64; 2]; 3],
     number: impl Fn(u32) -> u64,
-    part: &ClosedPart,
-) -> bool {
-    let mut chosen = [(u64::MAX, 0); SAMPLES];
+) -> [[f64; LINES]; 2] {
+    let mut chosen = [(u64::MAX, 0); LINES];
+    let mut count = 0;
     for i in own {
         let key = (number(*i), *i);
-        if key < chosen[SAMPLES - 1] {
-            let place = chosen.partition_point(|other| *other < key);
-            chosen[place..].rotate_right(1);
-            chosen[place] = key;
+        if key >= chosen[LINES - 1] {
+            continue;
         }
+        let [a, b, c] = corners(*i);
+        let from_a = |p: [f64; 2]| [p[0] - a[0], p[1] - a[1]];
+        if turn(from_a(b), from_a(c)) == 0.0 {
+            continue;
+        }
+        let mut place = LINES - 1;
+        while place > 0 && key < chosen[place - 1] {
+            chosen[place] = chosen[place - 1];
+            place -= 1;
+        }
+        chosen[place] = key;
+        count = LINES.min(count + 1);
     }
-    let mut lines: [Lines; 3] = Default::default();
-    for (_, i) in &chosen[..SAMPLES.min(own.len())] {
+    // NaN is near nothing.
+    let mut at = [[f64::NAN; LINES]; 2];
+    for (l, (_, i)) in chosen[..count].iter().enumerate() {
         // Somewhere within, but on no diagonal.
         const WEIGHTS: [f64; 3] = [0.416_421_356, 0.317_837_245, 0.265_741_399];
         let [a, b, c] = corners(*i);
-        let normal = cross(sub(b, a), sub(c, a)).map(f64::abs);
-        let axis = (0..3).fold(0, |most, k| if normal[k] > normal[most] { k } else { most });
-        let lines = &mut lines[axis];
-        if lines.count < LINES {
-            for (along, at) in [(axis + 1) % 3, (axis + 2) % 3].into_iter().zip(&mut lines.at) {
-                at[lines.count] =
-                    WEIGHTS[0] * a[along] + WEIGHTS[1] * b[along] + WEIGHTS[2] * c[along];
-            }
-            lines.count += 1;
+        for (k, at) in at.iter_mut().enumerate() {
+            at[l] = WEIGHTS[0] * a[k] + WEIGHTS[1] * b[k] + WEIGHTS[2] * c[k];
         }
     }
-    let mut crossings: [[Crossings; LINES]; 3] = Default::default();
-    for i in own {
-        let corners = corners(*i);
-        for (axis, (lines, crossings)) in lines.iter().zip(&mut crossings).enumerate() {
-            let ends = [1, 2].map(|next| {
-                let [a, b, c] = corners.map(|p| p[(axis + next) % 3]);
-                (a.min(b).min(c), a.max(b).max(c))
-            });
-            let is_near = |l: usize| {
-                let within =
-                    |k: usize| (ends[k].0 <= lines.at[k][l]) & (lines.at[k][l] <= ends[k].1);
-                within(0) & within(1)
-            };
-            for l in (0..lines.count).filter(|l| is_near(*l)) {
-                crossings[l].add(&corners, axis, [lines.at[0][l], lines.at[1][l]], part);
-            }
-        }
-    }
-    crossings.as_flattened_mut().iter_mut().all(Crossings::are_never_inside_out)
-}
-
-/// Where one line crosses a part.
-#[derive(Default)]
-struct Crossings {
-    /// Where along the line, and whether it enters.
-    list: Vec<(f64, bool)>,
-    /// It meets an edge, so it tells nothing.
-    is_void: bool,
-}
-
-impl Crossings {
-    fn add(&mut self, corners: &[Vec3; 3], axis: usize, at: [f64; 2], part: &ClosedPart) {
-        let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
-        let [a, b, c] = corners.map(|p| [p[u] - at[0], p[v] - at[1]]);
-        // The same numbers for both triangles of an edge, up to their signs.
-        let turn = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];
-        let turns = [turn(b, c), turn(c, a), turn(a, b)];
-        let is_up = turns.iter().all(|turn| *turn >= 0.0);
-        if !is_up && !turns.iter().all(|turn| *turn <= 0.0) {
-            return;
-        }
-        if turns.contains(&0.0) {
-            self.is_void = true;
-            return;
-        }
-        let sum = turns[0] + turns[1] + turns[2];
-        let place = (0..3).map(|k| turns[k] / sum * corners[k][axis]).sum::<f64>();
-        let enters = is_up == (part.sense < 0);
-        // Faces that touch are entered first.
-        let tied = 1e-9 * (part.max[axis] - part.min[axis]);
-        self.list.push((if enters { place - tied } else { place }, enters));
-    }
-
-    fn are_never_inside_out(&mut self) -> bool {
-        self.list.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
-        let mut depth = 0;
-        self.is_void
-            || self.list.iter().all(|(_, enters)| {
-                depth += if *enters { 1 } else { -1 };
-                depth >= 0
-            })
-    }
+    at
 }
 
 #[cfg(test)]
@@ -405,7 +453,8 @@ mod tests {
         /// By triangle: its sense, 0 if its part is open.
         fn senses(&self) -> Vec<i8> {
             let closed = ClosedParts::of(&self.positions, &self.triangles).unwrap();
-            let of = |i: usize| closed.part_of(i as u32).map_or(0, |part| part.sense);
+            let sense = |number: u32| closed.parts()[number as usize].sense;
+            let of = |i: usize| closed.number_of(i as u32).map_or(0, sense);
             (0..self.triangles.len()).map(of).collect()
         }
 
@@ -480,7 +529,7 @@ mod tests {
         ];
         assert_eq!(closed.parts(), expected);
         assert_eq!(closed.number_of(0), Some(0));
-        assert_eq!(closed.part_of(12), Some(&expected[1]));
+        assert_eq!(closed.number_of(12), Some(1));
     }
 
     #[test]

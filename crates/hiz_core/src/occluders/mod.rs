@@ -14,7 +14,6 @@
 //!
 //! The drawing is recorded into the caller's encoder; nothing here submits or reads back.
 
-#[cfg_attr(not(test), expect(dead_code, reason = "the rasteriser will be built on it"))]
 pub(crate) mod closed;
 #[cfg(feature = "methods")]
 pub(crate) mod copies;
