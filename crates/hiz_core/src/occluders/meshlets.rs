@@ -14,6 +14,8 @@ use crate::host::curve::spread;
 use crate::host::linear::{Vec3, cross, sub};
 use crate::host::memory;
 use crate::host::rounding::split;
+use crate::host::threads::{on_threads, worth_it};
+use crate::occluders::closed::{ClosedPart, ClosedParts};
 
 /// The most triangles of a meshlet.
 pub(crate) const MAX_TRIANGLES: usize = 128;
@@ -46,6 +48,20 @@ pub(crate) struct Meshlet {
     pub(crate) first_low: Option<u32>,
     /// The areas of its triangles as seen along each axis, added up.
     pub(crate) facing: [f32; 3],
+    /// Which of [`Blocks::solids`] is about it, if some of its triangles are of closed parts.
+    pub(crate) solids: Option<u32>,
+}
+
+/// What a meshlet has of closed parts of its mesh.
+#[derive(Debug, Clone)]
+pub(crate) struct Solids {
+    /// The box around all of these parts, in mesh coordinates.
+    pub(crate) min: Vec3,
+    pub(crate) max: Vec3,
+    /// The parts, in [`Blocks::solid_parts`].
+    pub(crate) parts: Range<u32>,
+    /// Where its triangles begin in [`Blocks::senses`], in groups of [`LANES`].
+    pub(crate) first_group: u32,
 }
 
 impl Meshlet {
@@ -66,6 +82,13 @@ pub(crate) struct Blocks {
     pub(crate) corners: Vec<[[u8; LANES]; 3]>,
     /// The box around each part of a meshlet, in mesh coordinates: its corners `[min, max]`.
     pub(crate) parts: Vec<[Vec3; 2]>,
+    /// For the meshlets that have [`Meshlet::solids`].
+    pub(crate) solids: Vec<Solids>,
+    pub(crate) solid_parts: Vec<ClosedPart>,
+    /// By triangle of theirs: the sense of its part ([`ClosedPart::sense`]), 0 if it is not closed.
+    pub(crate) senses: Vec<[i8; LANES]>,
+    /// By triangle of theirs: its part, from [`Solids::parts`] on, if it is closed.
+    pub(crate) part_of: Vec<[u8; LANES]>,
 }
 
 impl Blocks {
@@ -73,7 +96,11 @@ impl Blocks {
     pub(crate) fn bytes(&self) -> u64 {
         let floats = self.high.iter().chain(&self.low).map(Vec::len).sum::<usize>();
         let triangles = size_of_val(&self.corners[..]) + size_of_val(&self.parts[..]);
-        (floats * size_of::<f32>() + triangles) as u64
+        let solids = size_of_val(&self.solids[..])
+            + size_of_val(&self.solid_parts[..])
+            + size_of_val(&self.senses[..])
+            + size_of_val(&self.part_of[..]);
+        (floats * size_of::<f32>() + triangles + solids) as u64
     }
 }
 
@@ -119,7 +146,7 @@ pub(super) fn cluster(
     meshlets: &mut Vec<Meshlet>,
     blocks: &mut Blocks,
 ) -> Result<()> {
-    let order = along_the_curve(positions, triangles)?;
+    let (order, closed) = order_and_parts(positions, triangles)?;
     let given = memory::collected(triangles.iter().copied(), "triangles")?;
     // By vertex: the meshlet that met it last, and its place in that one's block.
     let mut place = memory::list(positions.len(), "vertices")?;
@@ -130,9 +157,10 @@ pub(super) fn cluster(
         let triangle = given[index as usize];
         let fresh = triangle.iter().filter(|v| place[**v as usize].0 != number).count();
         if open.corners.len() == MAX_TRIANGLES || open.vertices.len() + fresh > MAX_VERTICES {
-            open.close(positions, first_triangle + sorted as u32, meshlets, blocks)?;
+            open.close(positions, &closed, first_triangle + sorted as u32, meshlets, blocks)?;
             number += 1;
         }
+        open.given.push(index);
         open.corners.push(triangle.map(|v| {
             let seen = &mut place[v as usize];
             if seen.0 != number {
@@ -143,7 +171,20 @@ pub(super) fn cluster(
         }));
         triangles[sorted] = triangle;
     }
-    open.close(positions, first_triangle + triangles.len() as u32, meshlets, blocks)
+    open.close(positions, &closed, first_triangle + triangles.len() as u32, meshlets, blocks)
+}
+
+/// The triangles along the curve, and the closed parts; each on a thread of its own where it is
+/// worth that.
+fn order_and_parts(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Vec<u32>, ClosedParts)> {
+    /// What the shorter one of both takes at least, in nanoseconds per triangle.
+    const LEAST_NS: u64 = 10;
+    let (mut order, mut closed) = (Ok(Vec::new()), Ok(ClosedParts::default()));
+    let mut find_order = || order = along_the_curve(positions, triangles);
+    let mut find_closed = || closed = ClosedParts::of(positions, triangles);
+    let both: [&mut (dyn FnMut() + Send); 2] = [&mut find_order, &mut find_closed];
+    on_threads(worth_it(LEAST_NS * triangles.len() as u64), both, |find| find());
+    Ok((order?, closed?))
 }
 
 /// Triangles of a part.
@@ -154,9 +195,58 @@ const PART: usize = PART_GROUPS * LANES;
 struct Open {
     vertices: Vec<u32>,
     corners: Vec<[u8; 3]>,
+    /// Its triangles' numbers as they were given.
+    given: Vec<u32>,
 }
 
 impl Open {
+    /// Appends what its triangles have of closed parts to `blocks`; `None` if that is nothing.
+    fn solids(&self, closed: &ClosedParts, blocks: &mut Blocks) -> Result<Option<u32>> {
+        let is_closed = |triangle: &u32| closed.number_of(*triangle).is_some();
+        if !self.given.iter().any(is_closed) {
+            return Ok(None);
+        }
+        let first = blocks.solid_parts.len();
+        let mut solids = Solids {
+            min: [f64::INFINITY; 3],
+            max: [f64::NEG_INFINITY; 3],
+            parts: first as u32..first as u32,
+            first_group: blocks.senses.len() as u32,
+        };
+        // Of the parts so far: their numbers in the mesh.
+        let mut numbers: Vec<u32> = Vec::new();
+        let groups = self.given.len().div_ceil(LANES);
+        memory::reserve(&mut blocks.senses, groups, "triangles")?;
+        memory::reserve(&mut blocks.part_of, groups, "triangles")?;
+        for group in self.given.chunks(LANES) {
+            let (mut senses, mut part_of) = ([0; LANES], [0; LANES]);
+            for (lane, triangle) in group.iter().enumerate() {
+                let Some(number) = closed.number_of(*triangle) else { continue };
+                let part = closed.parts()[number as usize];
+                // The last ones first, because neighbours are of the same part.
+                let known = numbers.iter().rposition(|other| *other == number);
+                if known.is_none() {
+                    numbers.push(number);
+                    memory::reserve(&mut blocks.solid_parts, 1, "parts")?;
+                    blocks.solid_parts.push(part);
+                    for k in 0..3 {
+                        solids.min[k] = solids.min[k].min(part.min[k]);
+                        solids.max[k] = solids.max[k].max(part.max[k]);
+                    }
+                }
+                part_of[lane] = known.unwrap_or(numbers.len() - 1) as u8;
+                senses[lane] = part.sense;
+            }
+            blocks.senses.push(senses);
+            blocks.part_of.push(part_of);
+        }
+        solids.parts.end = blocks.solid_parts.len() as u32;
+        let index = blocks.solids.len() as u32;
+        memory::reserve(&mut blocks.solids, 1, "meshlets")?;
+        blocks.solids.push(solids);
+        Ok(Some(index))
+    }
+
     /// The areas of its triangles as seen along each axis, added up.
     fn facing(&self, positions: &[Vec3]) -> [f32; 3] {
         let mut sum = [0.0; 3];
@@ -175,6 +265,7 @@ impl Open {
     fn close(
         &mut self,
         positions: &[Vec3],
+        closed: &ClosedParts,
         end: u32,
         meshlets: &mut Vec<Meshlet>,
         blocks: &mut Blocks,
@@ -229,6 +320,7 @@ impl Open {
             }
             blocks.parts.push([min, max]);
         }
+        let solids = self.solids(closed, blocks)?;
         meshlets.push(Meshlet {
             min,
             max,
@@ -239,9 +331,11 @@ impl Open {
             first_part,
             first_low,
             facing,
+            solids,
         });
         self.vertices.clear();
         self.corners.clear();
+        self.given.clear();
         Ok(())
     }
 }

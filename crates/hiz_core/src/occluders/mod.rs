@@ -3,6 +3,7 @@
 //! The data goes through these files:
 //!
 //! 1. `shapes` checks meshes and cuts them into `meshlets`, each mesh in its own space.
+//!    `closed` finds the parts of a mesh that bound solids.
 //!    `placement` says where the copies of a mesh stand.
 //! 2. `drawing` says which copies are drawn, and `view` is a camera in the space of a copy.
 //! 3. `host_raster` draws the meshes on the host, for devices that are processors.
@@ -13,6 +14,7 @@
 //!
 //! The drawing is recorded into the caller's encoder; nothing here submits or reads back.
 
+pub(crate) mod closed;
 #[cfg(feature = "methods")]
 pub(crate) mod copies;
 pub(crate) mod depth;

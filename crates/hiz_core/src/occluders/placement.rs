@@ -99,6 +99,11 @@ impl Placement {
         }
     }
 
+    /// Whether the matrix flattens the mesh, or nearly so.
+    pub(super) fn is_flat(&self) -> bool {
+        self.matrix.is_some() && self.inverse.is_none()
+    }
+
     /// The world position of a vertex: in float64, rounded once per operation.
     #[inline]
     pub(crate) fn world(&self, p: Vec3) -> Vec3 {

@@ -115,11 +115,13 @@ impl Steps {
         let last = STEP - 1;
         let middle = if is_planted!(fault, FarthestInTheMiddle) { 0.5 } else { 1.0 };
         let corner = |k: usize, is_last: bool| t.slope[k] * if is_last { last as f32 } else { 0.0 };
+        let low = |k: usize| corner(k, t.slope[k] < 0.0) * middle;
+        let high = |k: usize| corner(k, t.slope[k] >= 0.0);
         Self {
             gain: three(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
             loss: three(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
-            low: std::array::from_fn(|k| corner(k, t.slope[k] < 0.0) * middle),
-            high: std::array::from_fn(|k| corner(k, t.slope[k] >= 0.0)),
+            low: [low(0), low(1)],
+            high: [high(0), high(1)],
         }
     }
 }

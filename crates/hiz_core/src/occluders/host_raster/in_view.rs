@@ -99,7 +99,7 @@ fn in_share(scene: &Scene<'_>, view: &View, image: &Image, share: &Share) -> Res
         let (copy, placement) = scene.copies[*place];
         let mesh = &scene.shapes.meshes[placement.mesh as usize];
         let placed = view.placed(mesh, placement);
-        let lens = Lens::new(scene.camera, image, &placed, placement.mirrored);
+        let lens = Lens::new(scene.camera, image, &placed, placement);
         let before = candidates.len();
         if mesh.meshlets.len() > 1 && extent(Plain, &lens, image, mesh.min, mesh.max).is_none() {
             continue;

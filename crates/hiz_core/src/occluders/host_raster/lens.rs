@@ -4,14 +4,16 @@
 //! Depth is **nearness**: 0 on the far plane, 1 on the near plane, greater where nearer.
 //! It is reversed NDC depth, and 1 minus NDC depth for standard Z.
 
-use crate::host::linear::{Mat4, Vec3, dot, sub};
+use crate::host::linear::{Mat4, Vec3, dot, solve3, sub};
 use crate::host::rounding::flushed;
 use crate::host::vectors::Eight;
 use crate::input::camera::Camera;
 use crate::input::image::{ImageSize, MAX_IMAGE_SIDE};
+use crate::input::mesh::FaceCull;
 use crate::occluders::host_raster::lanes::{greatest, lanes, least, least_of, three};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::meshlets::LANES;
+use crate::occluders::placement::Placement;
 use crate::occluders::view::PlacedView;
 
 /// Units per pixel.
@@ -68,6 +70,19 @@ pub(super) struct Lens {
     exact: Mat4,
     /// Whether triangles are turned round: the copy is mirrored.
     pub(super) mirrored: bool,
+    /// Where faces that leave a closed part are left out; `None`: nowhere.
+    pub(super) leaving: Option<Leaving>,
+}
+
+/// Where a ray of the view that leaves a closed part has entered it before.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leaving {
+    /// The sign of the area in the image of a face by which a ray leaves, if it is
+    /// counter-clockwise as seen from outside.
+    pub(super) sign: f32,
+    /// A box around what the image shows of the near plane, in mesh coordinates.
+    min: Vec3,
+    max: Vec3,
 }
 
 impl Image {
@@ -91,8 +106,21 @@ impl Image {
     }
 }
 
+impl Leaving {
+    /// Whether no ray of the view begins in this box.
+    #[inline(always)]
+    pub(super) fn is_outside(&self, min: &Vec3, max: &Vec3) -> bool {
+        (0..3).any(|k| (max[k] < self.min[k]) | (self.max[k] < min[k]))
+    }
+}
+
 impl Lens {
-    pub(super) fn new(camera: &Camera, image: &Image, placed: &PlacedView, mirrored: bool) -> Self {
+    pub(super) fn new(
+        camera: &Camera,
+        image: &Image,
+        placed: &PlacedView,
+        placement: &Placement,
+    ) -> Self {
         let [x, y, z, w] = placed.exact;
         let nearness: [f64; 4] = if camera.convention().is_reversed() {
             z
@@ -108,7 +136,48 @@ impl Lens {
         #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
         let rows = exact.map(|row| row.map(|v| flushed(v as f32)));
         let (eye_hi, eye_lo, eye) = (placed.eye_hi, placed.eye_lo, placed.eye);
-        Self { rows, eye_hi, eye_lo, eye, exact, mirrored }
+        let mirrored = placement.mirrored;
+        let mut lens = Self { rows, eye_hi, eye_lo, eye, exact, mirrored, leaving: None };
+        lens.leaving = lens.leaving(camera, image, placement);
+        lens
+    }
+
+    fn leaving(&self, camera: &Camera, image: &Image, placement: &Placement) -> Option<Leaving> {
+        /// How far the box reaches beyond the near plane, as a share of its way from the eye.
+        ///
+        /// That is more than what float32 moves the vertices by that are clipped there or not.
+        const SPARE: f64 = 1e-3;
+        if placement.is_flat() {
+            return None;
+        }
+        let [x, y, n, w] = &self.exact;
+        let spare = 2.0 * f64::from(UNITS);
+        let [half_x, half_y] = image.half.map(|half| f64::from(half) + spare);
+        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let mut size = 0.0_f64;
+        for corner in 0..4 {
+            let side = |k: u32, half: f64| if corner >> k & 1 == 0 { half } else { -half };
+            let less = |row: &[f64; 4], half: f64| -> [f64; 4] {
+                std::array::from_fn(|k| row[k] - half * w[k])
+            };
+            let planes = [less(x, side(0, half_x)), less(y, side(1, half_y)), less(n, 1.0)];
+            let from_eye =
+                solve3(&planes.map(|p| [p[0], p[1], p[2]]), planes.map(|plane| -plane[3]))?;
+            for k in 0..3 {
+                min[k] = min[k].min(from_eye[k]);
+                max[k] = max[k].max(from_eye[k]);
+                size = size.max(from_eye[k].abs());
+            }
+        }
+        let is_mirrored = placement.mirrored && !is_planted!(image.fault, SolidsIgnoreMirrors);
+        let of_backs = FaceCull::Back.as_seen_by(camera);
+        let of_backs = if is_mirrored { of_backs.reversed() } else { of_backs };
+        Some(Leaving {
+            // Rows run downwards, so what is counter-clockwise with y up has a negative area here.
+            sign: if of_backs == FaceCull::Back { 1.0 } else { -1.0 },
+            min: std::array::from_fn(|k| self.eye[k] + (min[k] - SPARE * size)),
+            max: std::array::from_fn(|k| self.eye[k] + (max[k] + SPARE * size)),
+        })
     }
 
     /// The rows at a point in mesh coordinates, in float64.
@@ -300,6 +369,7 @@ mod tests {
             eye: [0.0; 3],
             exact: [[0.0; 4]; 4],
             mirrored: false,
+            leaving: None,
         }
     }
 

@@ -10,6 +10,7 @@
 //!    (Greene, Kass and Miller 1993; Greene 1996).
 //!    The farthest depths of tiles tell this, and pixels where tiles cannot.
 //! 3. `vertices`: positions in the image, and the triangles that may cover a pixel's centre.
+//!    `sides` says which of their sides are drawn.
 //! 4. `triangle`: exact edges on a grid of 1/256 pixel, and the plane of the depth.
 //!    `edges` follows them from pixel to pixel and from tile to tile.
 //! 5. `tile`: 8x8 pixels as planes with coverage masks, or as pixels.
@@ -18,6 +19,8 @@
 //!
 //! **What it promises.**
 //! A pixel holds the nearest depth of the triangles that cover its centre.
+//! Of closed parts of a mesh the triangles by which a ray leaves do not count (`sides`): where one
+//! covers a centre, one by which it enters does, too.
 //! Coverage is exact for corners rounded to 1/256 pixel, with the top-left rule, so a centre on a
 //! shared edge is covered once.
 //! Depth is that of the plane through the corners as they were before that rounding, in float32,
@@ -45,6 +48,7 @@ pub(crate) mod one_by_one;
 mod pane;
 mod panes;
 pub(crate) mod planted_fault;
+mod sides;
 #[cfg(feature = "methods")]
 pub(crate) mod snapped;
 mod tile;
@@ -70,6 +74,7 @@ use crate::occluders::host_raster::lens::{Extent, Image, Lens, extent};
 use crate::occluders::host_raster::pane::Pane;
 use crate::occluders::host_raster::panes::{Grid, Panes, grid_for};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
+use crate::occluders::host_raster::sides::Senses;
 use crate::occluders::host_raster::triangle::{End, Triangle, clipped};
 use crate::occluders::host_raster::vertices::Vertices;
 use crate::occluders::host_raster::written::write;
@@ -179,8 +184,10 @@ impl HostRaster {
         options: &DrawOptions<'_>,
         last: &Told,
     ) -> Result<Drawn> {
-        let (lenses, mut candidates) = in_view(scene, &self.image, way.threads)?;
+        let (mut lenses, mut candidates) = in_view(scene, &self.image, way.threads)?;
         if options.is_limited() {
+            // The faces of a closed part that are left may be those that leave it.
+            lenses.iter_mut().for_each(|lens| lens.leaving = None);
             candidates = within_limits(scene.shapes, &lenses, candidates, options, last);
         }
         let mut candidates = self.in_parts(scene.shapes, &lenses, candidates)?;
@@ -399,7 +406,9 @@ fn triangles_of(
     let faces = if mirrored { faces.reversed() } else { faces };
     let groups = candidate.groups.0..candidate.groups.1;
     vertices.project(&shapes.blocks, meshlet, groups.clone(), lens, image);
-    vertices.select(&shapes.blocks, meshlet, groups, faces, image, pixels);
+    let mut senses = Senses::default();
+    let sides = senses.sides(&shapes.blocks, meshlet, lens, faces, image);
+    vertices.select(&shapes.blocks, meshlet, groups, &sides, image, pixels);
     if candidate.extent.pixels() > SORTED_FROM * vertices.num_kept() as i64 {
         vertices.sort(&shapes.blocks, meshlet);
     }

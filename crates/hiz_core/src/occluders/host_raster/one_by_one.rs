@@ -163,7 +163,7 @@ impl<'a> Looks<'a> {
         let image = Image::of_size(scene.camera.size(), Planted::default());
         let here = Placement::of_mesh(scene.shapes, first.mesh, None)?;
         let placed = view.placed(mesh, &here[0]);
-        let world = Lens::new(scene.camera, &image, &placed, false);
+        let world = Lens::new(scene.camera, &image, &placed, &here[0]);
         let mut of_copies = memory::list(scene.copies.len(), "copies")?;
         of_copies.resize_with(scene.copies.len(), || None);
         let faces = scene.cull_mode.as_seen_by(scene.camera);
@@ -176,7 +176,7 @@ impl<'a> Looks<'a> {
             let placement = scene.copies[copy as usize].1;
             let mesh = &scene.shapes.meshes[placement.mesh as usize];
             let placed = view.placed(mesh, placement);
-            Lens::new(scene.camera, image, &placed, placement.mirrored)
+            Lens::new(scene.camera, image, &placed, placement)
         })
     }
 }

@@ -58,6 +58,8 @@ pub(super) struct Pane {
     slots: Vec<u32>,
     /// Few tiles have layers, so theirs lie close together and stay in the caches.
     layers: Vec<Layers>,
+    /// How many of `layers` are in use; the others are left from images before.
+    used_layers: usize,
     pixels: Vec<f32>,
 }
 
@@ -85,6 +87,7 @@ impl Pane {
             rises: Vec::new(),
             slots: vec![0; count],
             layers: vec![Layers::default()],
+            used_layers: 1,
             pixels: vec![0.0; stride * (bottom - top) as usize],
         }
     }
@@ -119,7 +122,7 @@ impl Pane {
         self.is_cell_stale.fill(false);
         self.rises.clear();
         self.slots.fill(0);
-        self.layers.truncate(1);
+        self.used_layers = 1;
     }
 
     /// Whether an extent reaches into this pane.
@@ -269,8 +272,11 @@ impl Pane {
     #[inline(always)]
     fn settle(&mut self, index: usize) {
         if self.slots[index] == 0 {
-            self.slots[index] = self.layers.len() as u32;
-            self.layers.push(Layers::default());
+            if self.used_layers == self.layers.len() {
+                self.layers.resize(2 * self.used_layers, Layers::default());
+            }
+            self.slots[index] = self.used_layers as u32;
+            self.used_layers += 1;
         }
         if self.state(index) >= FULL {
             let plane = self.full_plane(index);

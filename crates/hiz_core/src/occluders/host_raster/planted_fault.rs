@@ -70,4 +70,14 @@ pub enum RasterFault {
     PanesShifted,
     /// Mirrored copies keep their winding.
     MirrorsIgnored,
+    /// Of closed parts the faces that are entered by are left out.
+    EnteringLeftOut,
+    /// All triangles count as those of closed parts.
+    OpenCountsAsClosed,
+    /// Closed parts are taken to be beyond the near plane, wherever they are.
+    SolidsBeforeTheEye,
+    /// Closed parts of mirrored copies keep their sense.
+    SolidsIgnoreMirrors,
+    /// Corners before they are rounded say whether a face leaves a closed part.
+    SidesOfUnroundedCorners,
 }

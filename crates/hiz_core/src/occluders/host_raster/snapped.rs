@@ -10,6 +10,7 @@ use crate::occluders::host_raster::edges::{Edges, LARGE, STEP};
 use crate::occluders::host_raster::lanes::three;
 use crate::occluders::host_raster::lens::{HALF, Image, Lens, UNITS};
 use crate::occluders::host_raster::planted_fault::Planted;
+use crate::occluders::host_raster::sides::Sides;
 use crate::occluders::host_raster::triangle::{End, Triangle, clipped};
 use crate::occluders::host_raster::vertices::Vertices;
 use crate::occluders::placement::Placement;
@@ -48,7 +49,7 @@ impl<'a> Grid<'a> {
         let shapes = surface.shapes();
         let lens = |placement: &Placement| {
             let placed = view.placed(&shapes.meshes[placement.mesh as usize], placement);
-            Lens::new(camera, &image, &placed, placement.mirrored)
+            Lens::new(camera, &image, &placed, placement)
         };
         Ok(Self {
             shapes,
@@ -70,7 +71,7 @@ impl<'a> Grid<'a> {
         let vertices = &mut *self.vertices;
         let (groups, pixels) = (meshlet.groups(), image.pixels());
         vertices.project(&shapes.blocks, meshlet, groups.clone(), lens, image);
-        vertices.select(&shapes.blocks, meshlet, groups, faces, image, pixels);
+        vertices.select(&shapes.blocks, meshlet, groups, &Sides::of(faces), image, pixels);
         for i in 0..vertices.num_kept() {
             let corners = vertices.corners(&shapes.blocks, meshlet, i);
             let projected = three(|k| vertices.projected(corners[k]));

@@ -6,10 +6,10 @@
 use std::ops::Range;
 
 use crate::host::vectors::widest;
-use crate::input::mesh::FaceCull;
 use crate::occluders::host_raster::lanes::{greatest, lanes, least, three};
 use crate::occluders::host_raster::lens::{HALF, Image, LEAST_W, Lens, rounded};
 use crate::occluders::host_raster::planted_fault::is_planted;
+use crate::occluders::host_raster::sides::Sides;
 use crate::occluders::host_raster::triangle::Corner;
 use crate::occluders::meshlets::{Blocks, LANES, MAX_TRIANGLES, MAX_VERTICES, Meshlet};
 
@@ -144,34 +144,58 @@ impl Vertices {
         blocks: &Blocks,
         meshlet: &Meshlet,
         groups: Range<u32>,
-        culled: FaceCull,
+        sides: &Sides<'_>,
         image: &Image,
         pixels: [(i32, i32); 2],
     ) {
         widest(
             #[inline(always)]
-            || self.select_among(blocks, meshlet, groups, culled, image, pixels),
+            || match *sides {
+                Sides::Both => self.select_among(
+                    blocks,
+                    meshlet,
+                    groups,
+                    #[inline(always)]
+                    |_, _, _, _| true,
+                    image,
+                    pixels,
+                ),
+                Sides::Same(sign) => self.select_among(
+                    blocks,
+                    meshlet,
+                    groups,
+                    #[inline(always)]
+                    |_, _, area, spare| area * sign >= -spare,
+                    image,
+                    pixels,
+                ),
+                Sides::Own(senses, sign) => self.select_among(
+                    blocks,
+                    meshlet,
+                    groups,
+                    #[inline(always)]
+                    |group, i, area, spare| area * (f32::from(senses[group][i]) * sign) >= -spare,
+                    image,
+                    pixels,
+                ),
+            },
         );
     }
 
+    /// `is_wanted` says by group, lane and area of a triangle whether its side is drawn; what the
+    /// last number leaves open counts as wanted.
     #[inline(always)]
     fn select_among(
         &mut self,
         blocks: &Blocks,
         meshlet: &Meshlet,
         groups: Range<u32>,
-        culled: FaceCull,
+        is_wanted: impl Fn(usize, usize, f32, f32) -> bool,
         image: &Image,
         [(left, right), (top, bottom)]: [(i32, i32); 2],
     ) {
         let count = meshlet.triangles.len();
         let corners = corners_of(blocks, meshlet, groups.clone());
-        // Rows run downwards, so what is counter-clockwise with y up has a negative area here.
-        let sign = match culled {
-            FaceCull::None => 0.0,
-            FaceCull::Back => -1.0,
-            FaceCull::Front => 1.0,
-        };
         let [half_x, half_y] = image.half;
         let mut kept = 0;
         for (group, corners) in (groups.start as u8..).zip(corners) {
@@ -201,8 +225,13 @@ impl Vertices {
                     & (rows.0 <= bottom);
                 let (ax, ay, bx, by) = (x1[i] - x0[i], y1[i] - y0[i], x2[i] - x0[i], y2[i] - y0[i]);
                 let (p, q) = (ax * by, ay * bx);
-                // What the roundings leave open is left to the exact test.
-                let faces = (p - q) * sign >= (p.abs() + q.abs()) * -1e-6;
+                // What rounding to the grid leaves open is left to the exact test.
+                // Each corner moves by half a unit, so each difference by at most one.
+                let spare = (p.abs() + q.abs()) * 1e-6
+                    + ((ax.abs() + ay.abs()) + (bx.abs() + by.abs()) + 2.5);
+                let spare =
+                    if is_planted!(image.fault, SidesOfUnroundedCorners) { 0.0 } else { spare };
+                let faces = is_wanted(usize::from(group), i, p - q, spare);
                 keep[i] = u32::from((outside == 0) & ((clip != 0) | (covers & faces)));
             }
             for (i, keep) in (0..).zip(keep) {

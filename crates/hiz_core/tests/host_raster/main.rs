@@ -3,9 +3,11 @@
 //! Planted faults show that these tests can fail.
 //! No device is needed.
 
+#[path = "../common/mod.rs"]
 mod common;
-#[path = "common/raster_reference.rs"]
+#[path = "../common/raster_reference.rs"]
 mod raster_reference;
+mod solids;
 
 use common::{CONVENTIONS, Random};
 use hiz_core::testing::RasterFault;
@@ -320,7 +322,11 @@ fn crowd(random: &mut Random) -> (View, Mesh) {
 fn in_other_ways(seeds: std::ops::Range<u64>, fault: Option<RasterFault>) -> Result<(), String> {
     for seed in seeds {
         let mut random = Random(seed);
-        let (view, mesh) = if seed % 2 == 0 { crowd(&mut random) } else { scene(&mut random) };
+        let (view, mesh) = match seed % 3 {
+            0 => crowd(&mut random),
+            1 => scene(&mut random),
+            _ => solids::scene(&mut random),
+        };
         let culled = view.seen.culled;
         let camera = &view.seen.camera;
         let surface = mesh.surface(culled, None);
@@ -354,17 +360,17 @@ fn in_other_ways(seeds: std::ops::Range<u64>, fault: Option<RasterFault>) -> Res
 }
 
 /// A camera whose pixels are the world's units: pixel (i, j) has its centre at (i + 0.5, j + 0.5).
-fn unit_pixels(side: u32) -> Camera {
+///
+/// Nearness is 0.5 at z = 0, and grows by `slope`, which must not be 0.
+fn unit_pixels(side: u32, slope: f64) -> Camera {
     let convention = DepthConvention::Reversed;
     let n = f64::from(side);
     let rows = [
         [2.0 / n, 0.0, 0.0, -1.0],
         [0.0, -2.0 / n, 0.0, 1.0],
-        [0.0, 0.0, 0.0, 0.5],
+        [0.0, 0.0, slope, 0.5],
         [0.0, 0.0, 0.0, 1.0],
     ];
-    // The depth has to depend on z; all triangles here have z = 0.
-    let rows = [rows[0], rows[1], [0.0, 0.0, 0.25, 0.5], rows[3]];
     Camera::from_clip_from_world(rows, ImageSize::new(side, side), convention).unwrap()
 }
 
@@ -386,7 +392,7 @@ fn times_covered(camera: &Camera, triangles: &[[Vec3; 3]], fault: Option<RasterF
 fn on_centres(fault: Option<RasterFault>) -> Result<(), String> {
     let mut random = Random(7);
     for (side, step) in [(32, 4), (64, 16), (64, 8), (128, 64), (256, 200), (1024, 500)] {
-        let camera = unit_pixels(side);
+        let camera = unit_pixels(side, 0.25);
         let n = side / step + 3;
         let mut at = |k: u32| {
             let jitter = random.below(step / 2 + 1);
@@ -408,7 +414,7 @@ fn on_centres(fault: Option<RasterFault>) -> Result<(), String> {
         }
     }
     // A closed fan about a centre: its border is part of it on the left and on top.
-    let camera = unit_pixels(64);
+    let camera = unit_pixels(64, 0.25);
     let middle = [20.5, 30.5, 0.0];
     let ring = [[28.5, 30.5], [20.5, 38.5], [12.5, 30.5], [20.5, 22.5]].map(|[x, y]| [x, y, 0.0]);
     let triangles: Vec<[Vec3; 3]> = (0..4).map(|k| [middle, ring[k], ring[(k + 1) % 4]]).collect();
@@ -431,7 +437,7 @@ fn on_centres(fault: Option<RasterFault>) -> Result<(), String> {
 ///
 /// No centre lies on an edge here; the vertices are no multiples of 1/256 pixel.
 fn across_the_guard_band(fault: Option<RasterFault>) -> Result<(), String> {
-    let camera = unit_pixels(64);
+    let camera = unit_pixels(64, 0.25);
     let mut random = Random(11);
     for _ in 0..40 {
         let middle = [random.range(0.0, 64.0), random.range(0.0, 64.0), 0.0];
@@ -462,6 +468,9 @@ fn copies(seeds: std::ops::Range<u64>, fault: Option<RasterFault>) -> Result<(),
         let mut random = Random(seed);
         let view = view(&mut random);
         let mut mesh = Mesh::default();
+        if seed % 2 == 0 {
+            mesh = solids::solid(&mut random);
+        }
         for _ in 0..20 {
             let center = around(&mut random, [0.0; 3], 1.0);
             mesh.triangle([0; 3].map(|_| around(&mut random, center, 0.5)));
@@ -523,7 +532,7 @@ fn each_centre_of_a_net_is_covered_once() {
 
 #[test]
 fn panes_threads_order_and_skipping_change_no_bit() {
-    in_other_ways(0..60, None).unwrap();
+    in_other_ways(0..90, None).unwrap();
 }
 
 #[test]
@@ -600,7 +609,9 @@ fn seen_by(fault: RasterFault) -> Option<String> {
         .and_then(|()| on_centres(fault))
         .and_then(|()| across_the_guard_band(fault))
         .and_then(|()| copies(0..300, fault))
-        .and_then(|()| in_other_ways(0..60, fault))
+        .and_then(|()| in_other_ways(0..90, fault))
+        .and_then(|()| solids::against_brute_force(0..1500, fault).map(|_| ()))
+        .and_then(|()| solids::no_pixel_is_lost(0..1500, fault).map(|_| ()))
         .err()
 }
 
@@ -627,6 +638,11 @@ fn planted_faults_are_seen() {
         RasterFault::WayByPane,
         RasterFault::PanesShifted,
         RasterFault::MirrorsIgnored,
+        RasterFault::EnteringLeftOut,
+        RasterFault::OpenCountsAsClosed,
+        RasterFault::SolidsBeforeTheEye,
+        RasterFault::SolidsIgnoreMirrors,
+        RasterFault::SidesOfUnroundedCorners,
     ];
     let unseen: Vec<RasterFault> = faults
         .into_iter()
