@@ -11,6 +11,7 @@ mod copies;
 mod exact_rays;
 mod faults;
 mod rays;
+mod solids;
 
 use hiz_core::testing::PlantedFault;
 use hiz_core::{

@@ -4,6 +4,7 @@ use crate::host::threads::{cores, on_threads};
 use crate::input::camera::Camera;
 use crate::occluders::surface::cells::Cells;
 use crate::occluders::surface::facets::{Facet, Rounder};
+use crate::occluders::surface::hulls::Hulls;
 use crate::occluders::surface::links::Standing;
 use crate::occluders::surface::looks::{Looks, Placed, Sought, Tiles, Wanted};
 use crate::occluders::surface::open_pixels::OpenPixels;
@@ -23,8 +24,12 @@ pub(super) fn searched(
     refinement: u32,
 ) -> Vec<f32> {
     let size = camera.size();
-    let looks =
-        Looks::new(&placed, camera, rounder, &Sought { tiles: &Tiles::open(size), open: None });
+    let looks = Looks::new(
+        &placed,
+        camera,
+        rounder,
+        &Sought { tiles: &Tiles::open(size), open: None, hulls: None },
+    );
     let open = OpenPixels::new(size, vec![true; size.pixels() as usize]);
     let beyond = if camera.convention().is_reversed() { 0.0 } else { 1.0 };
     let mut far = vec![beyond; size.pixels() as usize];
@@ -83,10 +88,16 @@ pub(super) fn image(
     let beyond: f32 = if convention.is_reversed() { 0.0 } else { 1.0 };
     let centres = Centres { depths: centres, size, convention };
     let (mut slabs, tried) = centres.slabs();
-    let mut looks = Looks::new(&placed, camera, rounder, &Sought { tiles: &tried, open: None });
+    let mut hulls = Hulls::new(placed, links, refinement);
+    let sought = Sought { tiles: &tried, open: None, hulls: None };
+    if let Some(hulls) = &mut hulls {
+        hulls.add(camera, rounder, &sought);
+    }
+    let sought = Sought { hulls: hulls.as_ref(), ..sought };
+    let mut looks = Looks::new(&placed, camera, rounder, &sought);
     let has_uncertain = looks.has_uncertain;
     let walk = Walk { placed, rounder, looks: &looks, links };
-    let mut far = proved(&walk, &mut slabs, &tried, size);
+    let mut far = proved(&walk, hulls.as_ref(), &mut slabs, &tried, size);
     let open = OpenPixels::new(size, slabs.iter().map(Slabs::is_any).collect());
     if !open.is_empty() {
         let pixels = open.of_rows([0, size.height.cast_signed() - 1]);
@@ -96,9 +107,13 @@ pub(super) fn image(
         };
         let bounds: Vec<f32> = pixels.iter().map(bound).collect();
         let tiles = Tiles::of(pixels.iter().copied().zip(bounds.iter().copied()), size);
-        looks.add(&placed, camera, rounder, &Sought { tiles: &tiles, open: Some(&open) });
+        let sought = Sought { tiles: &tiles, open: Some(&open), hulls: None };
+        if let Some(hulls) = &mut hulls {
+            hulls.add(camera, rounder, &sought);
+        }
+        looks.add(&placed, camera, rounder, &Sought { hulls: hulls.as_ref(), ..sought });
         let walk = Walk { placed, rounder, looks: &looks, links };
-        search(&walk, &open, &bounds, beyond, refinement, &mut far);
+        search(&walk, hulls.as_ref(), &open, &bounds, (beyond, refinement), &mut far);
     }
     if has_uncertain {
         // What is too uncertain for integers is missing everywhere so far.
@@ -106,7 +121,7 @@ pub(super) fn image(
         let is_open = |far: &f64| *far >= f64::from(beyond);
         let open = OpenPixels::new(size, all.iter().map(is_open).collect());
         let tiles = Tiles::open(size);
-        let sought = Sought { tiles: &tiles, open: None };
+        let sought = Sought { tiles: &tiles, open: None, hulls: None };
         let looks = &Looks::new(&placed, camera, rounder, &sought);
         Search { placed, links, rounder, looks, refinement }.lower(&open, &tiles, &mut all);
         far = rounded(&all, placed.fault);

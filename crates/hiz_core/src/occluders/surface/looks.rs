@@ -15,9 +15,11 @@ use crate::occluders::surface::coverage::pixels;
 use crate::occluders::surface::facets::{
     Corner, Facet, REACH, Rounder, Segment, UNITS, Vertex, occludes,
 };
+use crate::occluders::surface::hulls::Hulls;
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::projector::Projector;
+use crate::occluders::surface::solids::Solids;
 use crate::occluders::surface::square::Point;
 use crate::occluders::surface::topology::{Edge, NO_EDGE, Topology};
 
@@ -93,6 +95,8 @@ pub(super) struct Sought<'a> {
     pub(super) tiles: &'a Tiles,
     /// Only what may meet one of these pixels is, if there are any.
     pub(super) open: Option<&'a OpenPixels>,
+    /// What stands for triangles is not, either.
+    pub(super) hulls: Option<&'a Hulls<'a>>,
 }
 
 impl Sought<'_> {
@@ -100,7 +104,7 @@ impl Sought<'_> {
     ///
     /// Columns and rows of pixels are the least and the greatest, both within the image.
     #[inline]
-    fn excludes(&self, far: f64, columns: [i32; 2], rows: [i32; 2]) -> bool {
+    pub(super) fn excludes(&self, far: f64, columns: [i32; 2], rows: [i32; 2]) -> bool {
         self.open.is_some_and(|open| !open.any(columns, rows))
             || self.tiles.hide(far, columns, rows)
     }
@@ -223,6 +227,7 @@ pub(super) struct Placed<'a> {
     pub(super) shapes: &'a Shapes,
     pub(super) placements: &'a [Placement],
     pub(super) topology: &'a Topology,
+    pub(super) solids: &'a Solids,
     /// The faces that do not occlude, as this camera sees them.
     pub(super) culled: FaceCull,
     pub(super) fault: Planted,
@@ -279,7 +284,8 @@ impl Looks {
             let meshlets = &placed.shapes.meshes[placement.mesh as usize].meshlets;
             for (meshlet, slot) in meshlets.clone().zip(&mut slots) {
                 let it = &placed.shapes.meshlets[meshlet as usize];
-                if !lens.sees(it.min, it.max, sought) {
+                let is_replaced = sought.hulls.is_some_and(|hulls| hulls.replace(copy, meshlet));
+                if is_replaced || !lens.sees(it.min, it.max, sought) {
                     continue;
                 }
                 if *slot == NO_LOOK {
@@ -505,11 +511,12 @@ impl Look {
         let sides = placed.topology.sides(triangles);
         self.facets.resize(sides.len(), Facet::NOTHING);
         self.boxes.resize(sides.len(), PixelBox::NOTHING);
+        let left_out = sought.hulls.map_or(0, |hulls| hulls.left_out(self.copy, triangles));
         let mut extent = Extent::NOTHING;
         for (t, (corners, sides)) in
             placed.topology.corners(triangles).iter().zip(sides).enumerate()
         {
-            if self.has(t as u8) {
+            if (self.there | left_out) >> t & 1 != 0 {
                 continue;
             }
             let [a, b, c] = *corners;
@@ -660,7 +667,7 @@ fn cut(
 }
 
 /// A camera in the space of one copy of a mesh, in float64 without a proof.
-struct Lens {
+pub(super) struct Lens {
     /// `clip = rows * (p, 1)` with x, y, far and w.
     rows: [[f64; 4]; 4],
     near: f64,
@@ -669,7 +676,7 @@ struct Lens {
 }
 
 impl Lens {
-    fn new(projector: &Projector, placement: &Placement, size: ImageSize) -> Self {
+    pub(super) fn new(projector: &Projector, placement: &Placement, size: ImageSize) -> Self {
         let rows = projector.rows().map(|row| {
             let linear = [row[0], row[1], row[2]];
             let along = |k: usize| match &placement.matrix {
@@ -685,7 +692,7 @@ impl Lens {
     }
 
     /// Whether something in a box may be seen and is sought.
-    fn sees(&self, min: Vec3, max: Vec3, sought: &Sought<'_>) -> bool {
+    pub(super) fn sees(&self, min: Vec3, max: Vec3, sought: &Sought<'_>) -> bool {
         let mut outside = [0_u32; 5];
         let mut extent = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
         let (mut nearest, mut is_cut) = (f64::INFINITY, false);

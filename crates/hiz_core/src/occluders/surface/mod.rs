@@ -46,17 +46,19 @@
 //! 1. `topology` knows which triangles of a mesh share edges, `links` which copies of meshes do.
 //!    Both are made once.
 //! 2. `thresholds` chooses G by depth, from the depths at the centres of the pixels around P.
-//! 3. `looks` picks the meshlets that may matter, and rounds their vertices to 1/256 pixel
+//! 3. `solids` knows the closed convex parts of a mesh, such as boxes.
+//!    `hulls` takes each of them as one set G, and leaves its triangles out of the rest.
+//! 4. `looks` picks the meshlets that may matter, and rounds their vertices to 1/256 pixel
 //!    (`projector`, `facets`).
 //!    `walk` hands out their triangles and edges.
-//! 4. `proof` decides in exact integers which G cover their pixels (`coverage`, `squares`,
+//! 5. `proof` decides in exact integers which G cover their pixels (`coverage`, `squares`,
 //!    `chains`).
 //!    Single triangles come first (`alone`), then sets for the pixels that are left (`pixel_bits`).
 //!    Nearly all pixels end here.
-//! 5. `search` decides the rest by the same integers, with G that are connected across shared edges
+//! 6. `search` decides the rest by the same integers, with G that are connected across shared edges
 //!    that meet P (`meeting`).
 //!    Each connected component is a sheet, and the nearest of those that cover P counts.
-//! 6. `sheets` is the same search in float64, for vertices that are too uncertain for integers
+//! 7. `sheets` is the same search in float64, for vertices that are too uncertain for integers
 //!    (`cells`, `square`).
 //!    Tests compare all pixels with it.
 //!
@@ -95,6 +97,7 @@ mod cells;
 mod chains;
 mod coverage;
 mod facets;
+mod hulls;
 mod image;
 mod links;
 mod looks;
@@ -106,6 +109,7 @@ mod projector;
 mod proof;
 mod search;
 mod sheets;
+mod solids;
 mod square;
 mod squares;
 mod thresholds;
@@ -131,6 +135,7 @@ use crate::occluders::surface::links::{Links, Standing};
 use crate::occluders::surface::looks::Placed;
 use crate::occluders::surface::planted_fault::Planted;
 use crate::occluders::surface::projector::Projector;
+use crate::occluders::surface::solids::Solids;
 use crate::occluders::surface::topology::Topology;
 use crate::occluders::view::View;
 
@@ -165,7 +170,7 @@ impl ConservativeDepthOptions {
 /// | memory on the host, in bytes | per vertex | per triangle |
 /// |---|---|---|
 /// | always | 24 | 12 |
-/// | from the first conservative depth image on, besides | 6 | about 55 |
+/// | from the first conservative depth image on, besides | 6 | about 55, in boxes 80 |
 /// | while one is made, besides, of what is looked at | about 50 | about 80 |
 ///
 /// # Examples
@@ -207,6 +212,14 @@ pub struct OccluderSurface {
 struct Shared {
     topology: Topology,
     links: Links,
+    solids: Solids,
+}
+
+impl Shared {
+    /// Bytes on the host.
+    fn bytes(&self) -> u64 {
+        self.topology.bytes() + self.links.bytes() + self.solids.bytes()
+    }
 }
 
 impl OccluderSurface {
@@ -431,13 +444,15 @@ impl OccluderSurface {
         let shared = self.shared.get_or_init(|| {
             let topology = Topology::new(&self.shapes)?;
             let links = Links::new(&self.shapes, &topology, &placements);
-            Ok(Shared { topology, links })
+            let solids = Solids::new(&self.shapes, &topology);
+            Ok(Shared { topology, links, solids })
         });
-        let Shared { topology, links } = shared.as_ref().map_err(Clone::clone)?;
+        let Shared { topology, links, solids } = shared.as_ref().map_err(Clone::clone)?;
         let placed = Placed {
             shapes: &self.shapes,
             placements: &placements,
             topology,
+            solids,
             culled: self.cull_mode.as_seen_by(camera),
             fault,
         };
@@ -489,6 +504,6 @@ impl OccluderSurface {
     /// Bytes on the host, including the topology once a conservative depth image was made.
     pub fn host_bytes(&self) -> u64 {
         let made = self.shared.get().and_then(|shared| shared.as_ref().ok());
-        self.shapes.bytes() + made.map_or(0, |made| made.topology.bytes() + made.links.bytes())
+        self.shapes.bytes() + made.map_or(0, Shared::bytes)
     }
 }

@@ -65,6 +65,10 @@ pub enum PlantedFault {
     NoEdgeMargin,
     /// There, a triangle that covers a pixel's centre covers the pixel.
     CentreForSquare,
+    /// One side of the outline of a solid does not count.
+    SideOfOutlineIgnored,
+    /// One of the planes of a solid bounds its depth.
+    OnePlaneOfSolid,
     /// In the search, a triangle that covers the centre of a quarter covers the quarter.
     CentreForQuarter,
     /// In the proof, edges to triangles that were left out are no borders.

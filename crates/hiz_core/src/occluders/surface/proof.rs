@@ -29,6 +29,7 @@ use crate::occluders::surface::alone::Alone;
 use crate::occluders::surface::chains::{AtEdge, Mask, Steps, Tally};
 use crate::occluders::surface::coverage::area;
 use crate::occluders::surface::facets::{Corner, Facet, reach};
+use crate::occluders::surface::hulls::Hulls;
 use crate::occluders::surface::looks::{PixelBox, TILE, Tiles};
 use crate::occluders::surface::pixel_bits::PixelBits;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
@@ -49,6 +50,7 @@ const PER_LOOK: u64 = 10_000;
 /// The others may have a depth, too: that of one triangle which is beyond the first slab.
 pub(super) fn proved(
     walk: &Walk<'_>,
+    hulls: Option<&Hulls<'_>>,
     slabs: &mut [Slabs],
     tiles: &Tiles,
     size: ImageSize,
@@ -64,10 +66,18 @@ pub(super) fn proved(
     });
     on_threads(worth_it(ns), bands, |((depths, slabs), rows)| {
         let grid = grid(size.width, rows);
+        let fault = walk.placed.fault;
+        if let Some(hulls) = hulls {
+            hulls.cover(&mut Alone { grid, tiles, depths, fault });
+            for (slabs, depth) in slabs.iter_mut().zip(&*depths) {
+                if *depth <= slabs.last() {
+                    *slabs = Slabs::NONE;
+                }
+            }
+        }
         let left = widest(
             #[inline(always)]
             || {
-                let fault = walk.placed.fault;
                 let mut alone = Alone { grid, tiles, depths, fault };
                 for look in walk.looks.all.iter().filter(|look| look.is_in_rows(rows)) {
                     let here = look.within(

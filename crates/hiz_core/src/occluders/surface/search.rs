@@ -17,6 +17,7 @@ use std::cmp::Reverse;
 use crate::host::threads::{on_threads, worth_it};
 use crate::occluders::surface::coverage::QUARTERS;
 use crate::occluders::surface::facets::{Facet, REACH, UNITS, reach};
+use crate::occluders::surface::hulls::{Hulls, Parts};
 use crate::occluders::surface::meeting::{Meeting, NO_PIECE};
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::is_planted;
@@ -40,10 +41,10 @@ const PER_LOOK: u64 = 5_000;
 /// `beyond` is the value at the far plane, and `refinement` how often a pixel is quartered.
 pub(super) fn search(
     walk: &Walk<'_>,
+    hulls: Option<&Hulls<'_>>,
     open: &OpenPixels,
     bounds: &[f32],
-    beyond: f32,
-    refinement: u32,
+    (beyond, refinement): (f32, u32),
     far: &mut [f32],
 ) {
     let size = open.size();
@@ -56,13 +57,33 @@ pub(super) fn search(
     on_threads(worth_it(ns), parts, |(far, rows)| {
         let pixels = open.of_rows(rows);
         let bounds = &bounds[open.number(0, rows[0])..][..pixels.len()];
+        let place = |pixel: u32| (pixel - rows[0].cast_unsigned() * size.width) as usize;
+        let parts = hulls.map(|hulls| hulls.parts(open, rows, bounds, refinement));
+        let mut lowered;
+        let bounds = if let Some(parts) = &parts {
+            lowered = bounds.to_vec();
+            for (i, (pixel, bound)) in pixels.iter().zip(&mut lowered).enumerate() {
+                let found = parts.pixel(i);
+                if found < *bound {
+                    *bound = found;
+                    far[place(*pixel)] = found;
+                }
+            }
+            &lowered
+        } else {
+            bounds
+        };
+        if walk.looks.all.is_empty() {
+            return;
+        }
         let meeting = Meeting::new(walk, open, rows, bounds);
         let [covers, borders] = meeting.lists(pixels.len());
         let mut search = Search::new(walk, &meeting, beyond);
         for (i, pixel) in pixels.iter().enumerate() {
             let (column, row) = (pixel % size.width, pixel / size.width);
             let centre = [column, row].map(|v| v.cast_signed() * UNITS + UNITS / 2);
-            let far = &mut far[(pixel - rows[0].cast_unsigned() * size.width) as usize];
+            let far = &mut far[place(*pixel)];
+            search.known = parts.as_ref().map(|parts| (parts, i));
             if !search.begin(centre, covers.of(i), borders.of(i)) {
                 continue;
             }
@@ -163,6 +184,8 @@ struct Search<'a> {
     reach: i32,
     walk: &'a Walk<'a>,
     levels: Vec<Level>,
+    /// What solids show of the parts of the pixel.
+    known: Option<(&'a Parts, usize)>,
     /// By piece: its member, valid where `stamps` has the current stamp.
     places: Vec<u32>,
     stamps: Vec<u32>,
@@ -178,6 +201,7 @@ impl<'a> Search<'a> {
             reach: reach(walk.placed.fault),
             walk,
             levels: Vec::new(),
+            known: None,
             places: vec![0; count],
             stamps: vec![0; count],
             stamp: 0,
@@ -186,10 +210,14 @@ impl<'a> Search<'a> {
 
     /// Takes the pieces that cover a pixel's centre, and the edges that meet the pixel.
     ///
-    /// Returns whether anything covers the centre.
-    /// A sheet that covers the pixel has to.
+    /// Returns whether anything covers the centre, or a solid a part of the pixel.
+    /// A sheet that covers the pixel covers its centre.
     fn begin(&mut self, centre: [i32; 2], covers: &[u32], borders: &[u32]) -> bool {
-        if covers.is_empty() {
+        let is_in_part = || {
+            let parts = self.known.is_some_and(|(parts, number)| parts.is_any(number));
+            parts && !borders.is_empty()
+        };
+        if covers.is_empty() && !is_in_part() {
             return false;
         }
         if self.levels.is_empty() {
@@ -233,7 +261,12 @@ impl<'a> Search<'a> {
         let mut level = std::mem::take(&mut self.levels[depth]);
         // A quarter has sides of 2 units at least.
         let splits = refinement > 0 && square.half > 1;
-        let quarters = self.find_members(&mut level, (square, which), bound, splits);
+        let known = if splits && self.known.is_some() {
+            self.known(depth, which)
+        } else {
+            Quarters::NOTHING
+        };
+        let quarters = self.find_members(&mut level, (square, which), bound, known, splits);
         let alone = quarters.farthest();
         let (bound, is_found) = (bound.min(alone), is_found || alone < bound);
         let mut best = bound;
@@ -248,6 +281,18 @@ impl<'a> Search<'a> {
         }
         self.levels[depth] = level;
         best
+    }
+
+    /// What solids show of the quarters of a square.
+    #[cold]
+    fn known(&self, depth: usize, which: usize) -> Quarters {
+        let pick = |pick: fn(f32, f32) -> f32| match (self.known, depth) {
+            (Some((parts, number)), 0) => parts.quarters(number, pick),
+            (Some((parts, number)), 1) => parts.quarters_of(number, which),
+            _ => [f32::INFINITY; 4],
+        };
+        // A quarter of which a part is shown may become as near as that part.
+        Quarters { floors: pick(f32::min), alone: pick(f32::max) }
     }
 
     /// Whether a square may become so much nearer than `best` that it is looked at any closer.
@@ -266,6 +311,7 @@ impl<'a> Search<'a> {
         level: &mut Level,
         (square, which): (Square, usize),
         bound: f32,
+        known: Quarters,
         splits: bool,
     ) -> Quarters {
         let Level { pieces, members, .. } = level;
@@ -279,7 +325,7 @@ impl<'a> Search<'a> {
         let (half, half_of_quarter) = (grown(square.half), grown(square.half / 2));
         let squares = square.quarters();
         let size = (square.half / 2, square.half / 2 + self.reach);
-        let mut found = Quarters::NOTHING;
+        let mut found = known;
         for (piece, windings) in pieces.iter().copied() {
             let facet = &self.meeting.pieces[piece as usize].facet;
             if facet.nearest >= f64::from(bound) {
@@ -368,7 +414,9 @@ impl<'a> Search<'a> {
         refinement: u32,
     ) -> f32 {
         let hopeful = level.members.iter().filter(|m| m.is_met && m.near < best);
-        if hopeful.clone().all(|m| m.covers) {
+        // What solids show may be nearer than what covers all of the square.
+        let is_known = self.known.is_some() && quarters.alone.iter().any(|alone| *alone < best);
+        if !is_known && hopeful.clone().all(|m| m.covers) {
             return best;
         }
         if self.levels.len() == depth + 1 {
