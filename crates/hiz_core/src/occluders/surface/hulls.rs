@@ -24,6 +24,7 @@ use crate::input::mesh::FaceCull;
 use crate::occluders::surface::alone::Alone;
 use crate::occluders::surface::coverage::{QUARTERS, area, pixels};
 use crate::occluders::surface::facets::{Corner, Facet, REACH, Rounder, UNITS, Vertex, reach};
+use crate::occluders::surface::left_out::LeftOut;
 use crate::occluders::surface::links::Standing;
 use crate::occluders::surface::looks::{Lens, Placed, Sought, TILE};
 use crate::occluders::surface::open_pixels::OpenPixels;
@@ -118,15 +119,10 @@ impl Asked {
 pub(super) struct Hulls<'a> {
     solids: &'a Solids,
     placed: Placed<'a>,
-    /// By copy: where its solids begin in the lists by solid, less the number of its first one.
-    of_copy: Vec<u32>,
-    /// By solid of a copy: whether its triangles are left out, and whether it is done.
-    is_left_out: Vec<bool>,
+    left_out: LeftOut<'a>,
+    /// By solid of a copy: whether it is done, and the set of its faces that look at the eye.
     is_done: Vec<bool>,
-    /// By solid of a copy: the set of its faces that look at the eye, if it is done.
     fronts: Vec<u32>,
-    /// Meshlets of copies that have triangles besides those that are left out, sorted.
-    mixed: Vec<(u32, u32)>,
     clusters: Vec<Cluster>,
 }
 
@@ -139,55 +135,20 @@ impl<'a> Hulls<'a> {
         if solids.is_empty() || is_culled || refinement > LEVELS {
             return None;
         }
-        let mut hulls = Self {
-            solids,
-            placed,
-            of_copy: Vec::new(),
-            is_left_out: Vec::new(),
-            is_done: Vec::new(),
-            fronts: Vec::new(),
-            mixed: Vec::new(),
-            clusters: Vec::new(),
-        };
-        for (copy, placement) in (0..).zip(placed.placements) {
-            let own = solids.of_mesh(placement.mesh);
-            let before = hulls.is_left_out.len() as u32;
-            hulls.of_copy.push(before.wrapping_sub(own.start));
-            let is_linked = links.has_any(copy);
-            for solid in own {
-                let is_left_out = !is_linked && !solids.get(solid).is_shared;
-                hulls.is_left_out.push(is_left_out);
-                if !is_left_out {
-                    hulls.mixed.extend(solids.meshlets(solid).iter().map(|m| (copy, *m)));
-                }
-            }
-        }
-        hulls.is_done = vec![false; hulls.is_left_out.len()];
-        hulls.fronts = vec![0; hulls.is_left_out.len()];
-        hulls.mixed.sort_unstable();
-        Some(hulls)
+        let left_out = LeftOut::new(solids, placed.placements, |copy| links.has_any(copy));
+        let is_done = vec![false; left_out.num_solids()];
+        let fronts = vec![0; left_out.num_solids()];
+        Some(Self { solids, placed, left_out, is_done, fronts, clusters: Vec::new() })
     }
 
-    /// Whether no triangle of a meshlet is to be looked at.
-    pub(super) fn replace(&self, copy: u32, meshlet: u32) -> bool {
-        self.solids.is_solid(meshlet) && self.mixed.binary_search(&(copy, meshlet)).is_err()
-    }
-
-    /// Which of some triangles are left out: bit k for the triangle k after the first.
-    #[inline(never)]
-    pub(super) fn left_out(&self, copy: u32, triangles: &Range<u32>) -> u128 {
-        let mut set = 0;
-        for (k, triangle) in triangles.clone().enumerate() {
-            let solid = self.solids.of_triangle(triangle);
-            let is_out = solid.is_some_and(|solid| self.is_left_out[self.place(copy, solid)]);
-            set |= u128::from(is_out) << k;
-        }
-        set
+    /// The triangles that need not be looked at.
+    pub(super) fn left_out(&self) -> &LeftOut<'a> {
+        &self.left_out
     }
 
     #[inline]
     fn place(&self, copy: u32, solid: u32) -> usize {
-        self.of_copy[copy as usize].wrapping_add(solid) as usize
+        self.left_out.place(copy, solid)
     }
 
     /// Looks at the solids that are sought and not there.
@@ -215,7 +176,7 @@ impl<'a> Hulls<'a> {
             for solid in &cluster.cut {
                 let place = self.place(*copy, *solid);
                 self.is_done[place] = true;
-                self.keep(*copy, *solid);
+                self.left_out.keep(*copy, *solid);
             }
             for (solid, fronts) in &cluster.done {
                 let place = self.place(*copy, *solid);
@@ -224,18 +185,9 @@ impl<'a> Hulls<'a> {
             }
         }
         self.keep_seams();
-        self.mixed.sort_unstable();
+        self.left_out.sort();
         made.retain(|cluster| !cluster.hulls.is_empty());
         self.clusters.extend(made);
-    }
-
-    /// Leaves a solid to its triangles, besides.
-    fn keep(&mut self, copy: u32, solid: u32) {
-        let place = self.place(copy, solid);
-        if self.is_left_out[place] {
-            self.is_left_out[place] = false;
-            self.mixed.extend(self.solids.meshlets(solid).iter().map(|m| (copy, *m)));
-        }
     }
 
     /// Leaves solids to their triangles that show a face each at an edge that they share.
@@ -251,7 +203,7 @@ impl<'a> Hulls<'a> {
                 if seam.iter().filter(|member| shows(self, **member)).count() > 1 {
                     let showing = seam.iter().filter(|member| shows(self, **member));
                     let showing: Vec<u32> = showing.map(|(solid, _)| *solid).collect();
-                    showing.into_iter().for_each(|solid| self.keep(copy, solid));
+                    showing.into_iter().for_each(|solid| self.left_out.keep(copy, solid));
                 }
             }
         }

@@ -28,7 +28,7 @@ pub(super) fn searched(
         &placed,
         camera,
         rounder,
-        &Sought { tiles: &Tiles::open(size), open: None, hulls: None },
+        &Sought { tiles: &Tiles::open(size), open: None, left_out: None },
     );
     let open = OpenPixels::new(size, vec![true; size.pixels() as usize]);
     let beyond = if camera.convention().is_reversed() { 0.0 } else { 1.0 };
@@ -89,11 +89,11 @@ pub(super) fn image(
     let centres = Centres { depths: centres, size, convention };
     let (mut slabs, tried) = centres.slabs();
     let mut hulls = Hulls::new(placed, links, refinement);
-    let sought = Sought { tiles: &tried, open: None, hulls: None };
+    let sought = Sought { tiles: &tried, open: None, left_out: None };
     if let Some(hulls) = &mut hulls {
         hulls.add(camera, rounder, &sought);
     }
-    let sought = Sought { hulls: hulls.as_ref(), ..sought };
+    let sought = Sought { left_out: hulls.as_ref().map(Hulls::left_out), ..sought };
     let mut looks = Looks::new(&placed, camera, rounder, &sought);
     let has_uncertain = looks.has_uncertain;
     let walk = Walk { placed, rounder, looks: &looks, links };
@@ -107,11 +107,16 @@ pub(super) fn image(
         };
         let bounds: Vec<f32> = pixels.iter().map(bound).collect();
         let tiles = Tiles::of(pixels.iter().copied().zip(bounds.iter().copied()), size);
-        let sought = Sought { tiles: &tiles, open: Some(&open), hulls: None };
+        let sought = Sought { tiles: &tiles, open: Some(&open), left_out: None };
         if let Some(hulls) = &mut hulls {
             hulls.add(camera, rounder, &sought);
         }
-        looks.add(&placed, camera, rounder, &Sought { hulls: hulls.as_ref(), ..sought });
+        looks.add(
+            &placed,
+            camera,
+            rounder,
+            &Sought { left_out: hulls.as_ref().map(Hulls::left_out), ..sought },
+        );
         let walk = Walk { placed, rounder, looks: &looks, links };
         search(&walk, hulls.as_ref(), &open, &bounds, (beyond, refinement), &mut far);
     }
@@ -121,7 +126,7 @@ pub(super) fn image(
         let is_open = |far: &f64| *far >= f64::from(beyond);
         let open = OpenPixels::new(size, all.iter().map(is_open).collect());
         let tiles = Tiles::open(size);
-        let sought = Sought { tiles: &tiles, open: None, hulls: None };
+        let sought = Sought { tiles: &tiles, open: None, left_out: None };
         let looks = &Looks::new(&placed, camera, rounder, &sought);
         Search { placed, links, rounder, looks, refinement }.lower(&open, &tiles, &mut all);
         far = rounded(&all, placed.fault);

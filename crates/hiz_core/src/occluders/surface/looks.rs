@@ -15,7 +15,7 @@ use crate::occluders::surface::coverage::pixels;
 use crate::occluders::surface::facets::{
     Corner, Facet, REACH, Rounder, Segment, UNITS, Vertex, occludes,
 };
-use crate::occluders::surface::hulls::Hulls;
+use crate::occluders::surface::left_out::LeftOut;
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::projector::Projector;
@@ -96,7 +96,7 @@ pub(super) struct Sought<'a> {
     /// Only what may meet one of these pixels is, if there are any.
     pub(super) open: Option<&'a OpenPixels>,
     /// What stands for triangles is not, either.
-    pub(super) hulls: Option<&'a Hulls<'a>>,
+    pub(super) left_out: Option<&'a LeftOut<'a>>,
 }
 
 impl Sought<'_> {
@@ -284,7 +284,7 @@ impl Looks {
             let meshlets = &placed.shapes.meshes[placement.mesh as usize].meshlets;
             for (meshlet, slot) in meshlets.clone().zip(&mut slots) {
                 let it = &placed.shapes.meshlets[meshlet as usize];
-                let is_replaced = sought.hulls.is_some_and(|hulls| hulls.replace(copy, meshlet));
+                let is_replaced = sought.left_out.is_some_and(|all| all.has_all_of(copy, meshlet));
                 if is_replaced || !lens.sees(it.min, it.max, sought) {
                     continue;
                 }
@@ -511,7 +511,7 @@ impl Look {
         let sides = placed.topology.sides(triangles);
         self.facets.resize(sides.len(), Facet::NOTHING);
         self.boxes.resize(sides.len(), PixelBox::NOTHING);
-        let left_out = sought.hulls.map_or(0, |hulls| hulls.left_out(self.copy, triangles));
+        let left_out = sought.left_out.map_or(0, |all| all.among(self.copy, triangles));
         let mut extent = Extent::NOTHING;
         for (t, (corners, sides)) in
             placed.topology.corners(triangles).iter().zip(sides).enumerate()

@@ -47,7 +47,7 @@
 //!    Both are made once.
 //! 2. `thresholds` chooses G by depth, from the depths at the centres of the pixels around P.
 //! 3. `solids` knows the closed convex parts of a mesh, such as boxes.
-//!    `hulls` takes each of them as one set G, and leaves its triangles out of the rest.
+//!    `hulls` takes each of them as one set G, and its triangles are `left_out` of the rest.
 //! 4. `looks` picks the meshlets that may matter, and rounds their vertices to 1/256 pixel
 //!    (`projector`, `facets`).
 //!    `walk` hands out their triangles and edges.
@@ -99,6 +99,7 @@ mod coverage;
 mod facets;
 mod hulls;
 mod image;
+mod left_out;
 mod links;
 mod looks;
 mod meeting;
