@@ -141,8 +141,9 @@ def test_a_moved_mesh_is_drawn_as_an_uploaded_one(device: hizvk.Device, image: s
         again = device.render_depth(anew, camera, **IMAGES[image]).numpy()
         if image == "conservative":
             # A moved copy shares no edge with another one, so some pixels are farther (reversed Z).
+            # Where it is taken as a whole, its faces are a rounding of their corners farther.
             assert (images[-1] <= again).all()
-            assert (images[-1] == again).mean() > 0.99
+            assert (images[-1] >= again * (1 - 1e-5)).mean() > 0.99
         else:
             assert np.array_equal(images[-1], again)
     assert not np.array_equal(images[0], images[1])
