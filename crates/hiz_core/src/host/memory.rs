@@ -30,6 +30,13 @@ pub(crate) fn collected<T>(items: impl ExactSizeIterator<Item = T>, what: &str) 
     Ok(vec)
 }
 
+/// A list of equal values.
+pub(crate) fn filled<T: Clone>(len: usize, value: T, what: &str) -> Result<Vec<T>> {
+    let mut vec = list(len, what)?;
+    vec.resize(len, value);
+    Ok(vec)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,9 +1,10 @@
-//! Vector algebra, the Morton curve, rounding, memory, threads and wide vectors on the host.
+//! Vector algebra, the Morton curve, joined sets, rounding, memory, threads and wide vectors.
 //!
 //! This room knows numbers alone: no camera, no instance, no device.
 //! Every other room may use it.
 
 pub(crate) mod curve;
+pub(crate) mod forest;
 pub(crate) mod inverse;
 pub(crate) mod linear;
 pub(crate) mod memory;

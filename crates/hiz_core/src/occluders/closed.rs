@@ -19,6 +19,7 @@
 //! None of it depends on the order of the triangles.
 
 use crate::error::Result;
+use crate::host::forest::Forest;
 use crate::host::linear::{Vec3, cross, dot, sub};
 use crate::host::memory;
 
@@ -52,7 +53,7 @@ impl ClosedParts {
         let numbers = memory::collected(positions.iter().map(|p| mixed(*p)), "vertices")?;
         let (mut forest, is_open) = connected(&numbers, triangles)?;
         // By root: the number of its part.
-        let mut part_at = filled(positions.len(), OPEN)?;
+        let mut part_at = memory::filled(positions.len(), OPEN, "vertices")?;
         let mut sizes = Vec::new();
         let mut part_of = memory::list(triangles.len(), "triangles")?;
         for triangle in triangles {
@@ -73,7 +74,7 @@ impl ClosedParts {
             return Ok(Self::default());
         }
         drop(part_at);
-        let mut by_part = filled(sizes.iter().sum(), 0)?;
+        let mut by_part = memory::filled(sizes.iter().sum(), 0, "triangles")?;
         let ends = sizes.iter_mut().scan(0, |end, size| {
             *end += std::mem::replace(size, *end);
             Some(*end)
@@ -145,49 +146,14 @@ fn mixed(p: Vec3) -> u64 {
     number ^ (number >> 33)
 }
 
-/// A list of equal values.
-fn filled<T: Clone>(len: usize, value: T) -> Result<Vec<T>> {
-    let mut list = memory::list(len, "vertices")?;
-    list.resize(len, value);
-    Ok(list)
-}
-
-/// Sets of vertices that hang together, as trees (Galler and Fischer 1964).
-struct Forest(Vec<u32>);
-
-impl Forest {
-    #[inline]
-    fn root(&mut self, mut vertex: u32) -> u32 {
-        loop {
-            let parent = self.0[vertex as usize];
-            if parent == vertex {
-                return vertex;
-            }
-            // Paths are halved on the way.
-            let above = self.0[parent as usize];
-            self.0[vertex as usize] = above;
-            vertex = above;
-        }
-    }
-
-    #[inline]
-    fn join(&mut self, a: u32, b: u32) {
-        if self.0[a as usize] == self.0[b as usize] {
-            return;
-        }
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
-}
-
 /// The parts of a mesh, and by root whether its part is open.
 ///
 /// Vertices at equal positions are joined where the border about one of them alone is not zero.
 fn connected(numbers: &[u64], triangles: &[[u32; 3]]) -> Result<(Forest, Vec<bool>)> {
     let count = numbers.len();
-    let mut forest = Forest(memory::collected(0..count as u32, "vertices")?);
+    let mut forest = Forest::new(count as u32, "vertices")?;
     // The border about each vertex: what comes next, less what came before.
-    let mut borders = filled(count, 0_u64)?;
+    let mut borders = memory::filled(count, 0_u64, "vertices")?;
     for triangle in triangles {
         let [a, b, c] = *triangle;
         let [a, b, c] = [numbers[a as usize], numbers[b as usize], numbers[c as usize]];
@@ -201,7 +167,7 @@ fn connected(numbers: &[u64], triangles: &[[u32; 3]]) -> Result<(Forest, Vec<boo
         forest.join(triangle[1], triangle[2]);
     }
     weld(numbers, &mut borders, &mut forest)?;
-    let mut is_open = filled(count, false)?;
+    let mut is_open = memory::filled(count, false, "vertices")?;
     for (vertex, border) in (0..).zip(borders) {
         if border != 0 {
             is_open[forest.root(vertex) as usize] = true;
@@ -215,7 +181,7 @@ fn weld(numbers: &[u64], borders: &mut [u64], forest: &mut Forest) -> Result<()>
     const EMPTY: u32 = u32::MAX;
     let count = borders.iter().filter(|border| **border != 0).count();
     let slots = (2 * count).next_power_of_two();
-    let mut table = filled(slots, EMPTY)?;
+    let mut table = memory::filled(slots, EMPTY, "vertices")?;
     for vertex in 0..borders.len() {
         if borders[vertex] == 0 {
             continue;

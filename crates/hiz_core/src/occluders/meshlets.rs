@@ -48,17 +48,17 @@ pub(crate) struct Meshlet {
     pub(crate) first_low: Option<u32>,
     /// The areas of its triangles as seen along each axis, added up.
     pub(crate) facing: [f32; 3],
-    /// Which of [`Blocks::solids`] is about it, if some of its triangles are of closed parts.
-    pub(crate) solids: Option<u32>,
+    /// Which of [`Blocks::closed`] is about it, if some of its triangles are of closed parts.
+    pub(crate) closed: Option<u32>,
 }
 
 /// What a meshlet has of closed parts of its mesh.
 #[derive(Debug, Clone)]
-pub(crate) struct Solids {
+pub(crate) struct ClosedOf {
     /// The box around all of these parts, in mesh coordinates.
     pub(crate) min: Vec3,
     pub(crate) max: Vec3,
-    /// The parts, in [`Blocks::solid_parts`].
+    /// The parts, in [`Blocks::closed_parts`].
     pub(crate) parts: Range<u32>,
     /// Where its triangles begin in [`Blocks::senses`], in groups of [`LANES`].
     pub(crate) first_group: u32,
@@ -82,12 +82,12 @@ pub(crate) struct Blocks {
     pub(crate) corners: Vec<[[u8; LANES]; 3]>,
     /// The box around each part of a meshlet, in mesh coordinates: its corners `[min, max]`.
     pub(crate) parts: Vec<[Vec3; 2]>,
-    /// For the meshlets that have [`Meshlet::solids`].
-    pub(crate) solids: Vec<Solids>,
-    pub(crate) solid_parts: Vec<ClosedPart>,
+    /// For the meshlets that have [`Meshlet::closed`].
+    pub(crate) closed: Vec<ClosedOf>,
+    pub(crate) closed_parts: Vec<ClosedPart>,
     /// By triangle of theirs: the sense of its part ([`ClosedPart::sense`]), 0 if it is not closed.
     pub(crate) senses: Vec<[i8; LANES]>,
-    /// By triangle of theirs: its part, from [`Solids::parts`] on, if it is closed.
+    /// By triangle of theirs: its part, from [`ClosedOf::parts`] on, if it is closed.
     pub(crate) part_of: Vec<[u8; LANES]>,
 }
 
@@ -96,11 +96,11 @@ impl Blocks {
     pub(crate) fn bytes(&self) -> u64 {
         let floats = self.high.iter().chain(&self.low).map(Vec::len).sum::<usize>();
         let triangles = size_of_val(&self.corners[..]) + size_of_val(&self.parts[..]);
-        let solids = size_of_val(&self.solids[..])
-            + size_of_val(&self.solid_parts[..])
+        let closed = size_of_val(&self.closed[..])
+            + size_of_val(&self.closed_parts[..])
             + size_of_val(&self.senses[..])
             + size_of_val(&self.part_of[..]);
-        (floats * size_of::<f32>() + triangles + solids) as u64
+        (floats * size_of::<f32>() + triangles + closed) as u64
     }
 }
 
@@ -201,13 +201,13 @@ struct Open {
 
 impl Open {
     /// Appends what its triangles have of closed parts to `blocks`; `None` if that is nothing.
-    fn solids(&self, closed: &ClosedParts, blocks: &mut Blocks) -> Result<Option<u32>> {
+    fn closed_of(&self, closed: &ClosedParts, blocks: &mut Blocks) -> Result<Option<u32>> {
         let is_closed = |triangle: &u32| closed.number_of(*triangle).is_some();
         if !self.given.iter().any(is_closed) {
             return Ok(None);
         }
-        let first = blocks.solid_parts.len();
-        let mut solids = Solids {
+        let first = blocks.closed_parts.len();
+        let mut own = ClosedOf {
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
             parts: first as u32..first as u32,
@@ -227,11 +227,11 @@ impl Open {
                 let known = numbers.iter().rposition(|other| *other == number);
                 if known.is_none() {
                     numbers.push(number);
-                    memory::reserve(&mut blocks.solid_parts, 1, "parts")?;
-                    blocks.solid_parts.push(part);
+                    memory::reserve(&mut blocks.closed_parts, 1, "parts")?;
+                    blocks.closed_parts.push(part);
                     for k in 0..3 {
-                        solids.min[k] = solids.min[k].min(part.min[k]);
-                        solids.max[k] = solids.max[k].max(part.max[k]);
+                        own.min[k] = own.min[k].min(part.min[k]);
+                        own.max[k] = own.max[k].max(part.max[k]);
                     }
                 }
                 part_of[lane] = known.unwrap_or(numbers.len() - 1) as u8;
@@ -240,10 +240,10 @@ impl Open {
             blocks.senses.push(senses);
             blocks.part_of.push(part_of);
         }
-        solids.parts.end = blocks.solid_parts.len() as u32;
-        let index = blocks.solids.len() as u32;
-        memory::reserve(&mut blocks.solids, 1, "meshlets")?;
-        blocks.solids.push(solids);
+        own.parts.end = blocks.closed_parts.len() as u32;
+        let index = blocks.closed.len() as u32;
+        memory::reserve(&mut blocks.closed, 1, "meshlets")?;
+        blocks.closed.push(own);
         Ok(Some(index))
     }
 
@@ -320,7 +320,7 @@ impl Open {
             }
             blocks.parts.push([min, max]);
         }
-        let solids = self.solids(closed, blocks)?;
+        let closed = self.closed_of(closed, blocks)?;
         meshlets.push(Meshlet {
             min,
             max,
@@ -331,7 +331,7 @@ impl Open {
             first_part,
             first_low,
             facing,
-            solids,
+            closed,
         });
         self.vertices.clear();
         self.corners.clear();

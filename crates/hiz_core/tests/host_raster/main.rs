@@ -640,8 +640,8 @@ fn planted_faults_are_seen() {
         RasterFault::MirrorsIgnored,
         RasterFault::EnteringLeftOut,
         RasterFault::OpenCountsAsClosed,
-        RasterFault::SolidsBeforeTheEye,
-        RasterFault::SolidsIgnoreMirrors,
+        RasterFault::ClosedBeforeTheEye,
+        RasterFault::ClosedIgnoreMirrors,
         RasterFault::SidesOfUnroundedCorners,
     ];
     let unseen: Vec<RasterFault> = faults

@@ -169,7 +169,7 @@ impl Lens {
                 size = size.max(from_eye[k].abs());
             }
         }
-        let is_mirrored = placement.mirrored && !is_planted!(image.fault, SolidsIgnoreMirrors);
+        let is_mirrored = placement.mirrored && !is_planted!(image.fault, ClosedIgnoreMirrors);
         let of_backs = FaceCull::Back.as_seen_by(camera);
         let of_backs = if is_mirrored { of_backs.reversed() } else { of_backs };
         Some(Leaving {

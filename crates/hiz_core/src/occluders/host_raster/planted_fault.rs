@@ -75,9 +75,9 @@ pub enum RasterFault {
     /// All triangles count as those of closed parts.
     OpenCountsAsClosed,
     /// Closed parts are taken to be beyond the near plane, wherever they are.
-    SolidsBeforeTheEye,
+    ClosedBeforeTheEye,
     /// Closed parts of mirrored copies keep their sense.
-    SolidsIgnoreMirrors,
+    ClosedIgnoreMirrors,
     /// Corners before they are rounded say whether a face leaves a closed part.
     SidesOfUnroundedCorners,
 }

@@ -8,7 +8,7 @@
 use crate::input::mesh::FaceCull;
 use crate::occluders::host_raster::lens::{Image, Lens};
 use crate::occluders::host_raster::planted_fault::is_planted;
-use crate::occluders::meshlets::{Blocks, LANES, MAX_TRIANGLES, Meshlet, Solids};
+use crate::occluders::meshlets::{Blocks, ClosedOf, LANES, MAX_TRIANGLES, Meshlet};
 
 /// Groups of a meshlet's triangles.
 const GROUPS: usize = MAX_TRIANGLES / LANES;
@@ -61,14 +61,14 @@ impl Senses {
             self.0 = [[1; LANES]; GROUPS];
             return Sides::Own(&self.0, entering);
         }
-        let Some(solids) = meshlet.solids else { return Sides::Both };
-        let Solids { min, max, parts, first_group } = &blocks.solids[solids as usize];
+        let Some(closed) = meshlet.closed else { return Sides::Both };
+        let ClosedOf { min, max, parts, first_group } = &blocks.closed[closed as usize];
         let count = meshlet.groups().len();
         let senses = &blocks.senses[*first_group as usize..][..count];
-        if leaving.is_outside(min, max) || is_planted!(image.fault, SolidsBeforeTheEye) {
+        if leaving.is_outside(min, max) || is_planted!(image.fault, ClosedBeforeTheEye) {
             return Sides::Own(senses, entering);
         }
-        let parts = &blocks.solid_parts[parts.start as usize..parts.end as usize];
+        let parts = &blocks.closed_parts[parts.start as usize..parts.end as usize];
         let mut counts = [0_i8; MAX_TRIANGLES];
         for (part, counts) in parts.iter().zip(&mut counts) {
             *counts = i8::from(leaving.is_outside(&part.min, &part.max));

@@ -101,12 +101,11 @@ struct Asked {
 
 impl Asked {
     fn new(half: i32, fault: Planted) -> Self {
-        let is_point = is_planted!(fault, PlaneWithoutReach) || is_planted!(fault, DepthAtCentre);
-        let is_centre = if half == UNITS / 2 {
-            is_planted!(fault, CentreForSquare)
-        } else {
-            is_planted!(fault, CentreForQuarter)
-        };
+        // Lists, because all faults are the same `false` where none can be planted.
+        let faults = [is_planted!(fault, PlaneWithoutReach), is_planted!(fault, DepthAtCentre)];
+        let is_point = faults.contains(&true);
+        let faults = [is_planted!(fault, CentreForQuarter), is_planted!(fault, CentreForSquare)];
+        let is_centre = faults[usize::from(half == UNITS / 2)];
         Self {
             half: if is_point { 0.0 } else { f64::from(half + REACH) },
             grown: if is_centre { 0 } else { i64::from(half + reach(fault)) },

@@ -445,7 +445,7 @@ impl OccluderSurface {
         let shared = self.shared.get_or_init(|| {
             let topology = Topology::new(&self.shapes)?;
             let links = Links::new(&self.shapes, &topology, &placements);
-            let solids = Solids::new(&self.shapes, &topology);
+            let solids = Solids::new(&self.shapes, &topology)?;
             Ok(Shared { topology, links, solids })
         });
         let Shared { topology, links, solids } = shared.as_ref().map_err(Clone::clone)?;

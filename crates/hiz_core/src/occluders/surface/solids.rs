@@ -6,7 +6,10 @@
 
 use std::ops::Range;
 
+use crate::error::Result;
+use crate::host::forest::Forest;
 use crate::host::linear::{Vec3, cross, dot, sub};
+use crate::host::memory;
 use crate::occluders::shapes::Shapes;
 use crate::occluders::surface::topology::{NO_EDGE, Topology};
 
@@ -94,10 +97,14 @@ struct Own {
 }
 
 impl Solids {
-    pub(super) fn new(shapes: &Shapes, topology: &Topology) -> Self {
+    /// Those of the meshes of `shapes`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub(super) fn new(shapes: &Shapes, topology: &Topology) -> Result<Self> {
         let mut solids = Self {
-            of_triangle: vec![NO_SOLID; shapes.triangles.len()],
-            is_solid: vec![false; shapes.meshlets.len()],
+            of_triangle: memory::filled(shapes.triangles.len(), NO_SOLID, "triangles")?,
+            is_solid: memory::filled(shapes.meshlets.len(), false, "meshlets")?,
             ..Self::default()
         };
         for mesh in 0..shapes.meshes.len() {
@@ -105,26 +112,27 @@ impl Solids {
                 [solids.groups.len(), solids.all.len(), solids.seams.len()].map(|len| len as u32)
             };
             let first = count(&solids);
-            solids.add(shapes, topology, mesh);
+            solids.add(shapes, topology, mesh)?;
             let end = count(&solids);
             let [groups, own, seams] = std::array::from_fn(|k| first[k]..end[k]);
             solids.of_mesh.push(Own { groups, solids: own, seams });
         }
         if solids.all.is_empty() {
             // The usual case for large meshes.
-            return Self { of_mesh: solids.of_mesh, ..Self::default() };
+            return Ok(Self { of_mesh: solids.of_mesh, ..Self::default() });
         }
         for (is_solid, meshlet) in solids.is_solid.iter_mut().zip(&shapes.meshlets) {
             let triangles = meshlet.triangles.start as usize..meshlet.triangles.end as usize;
             *is_solid = solids.of_triangle[triangles].iter().all(|solid| *solid != NO_SOLID);
         }
-        solids
+        Ok(solids)
     }
 
-    fn add(&mut self, shapes: &Shapes, topology: &Topology, mesh: usize) {
+    fn add(&mut self, shapes: &Shapes, topology: &Topology, mesh: usize) -> Result<()> {
         let first = self.all.len();
-        let parts = Parts::new(shapes, topology, mesh);
-        let mut meshlet_of = Vec::new();
+        let parts = Parts::new(shapes, topology, mesh)?;
+        let count = shapes.meshes[mesh].triangles.len();
+        let mut meshlet_of = memory::list(count, "triangles")?;
         for m in shapes.meshes[mesh].meshlets.clone() {
             meshlet_of.resize(meshlet_of.len() + shapes.meshlets[m as usize].triangles.len(), m);
         }
@@ -165,6 +173,7 @@ impl Solids {
             }
             self.groups.push(Group { min, max, solids });
         }
+        Ok(())
     }
 
     /// Finds the edges at which more than two triangles meet.
@@ -332,11 +341,11 @@ impl Parts {
     /// Joins the triangles of a mesh across edges at which two of them meet from different sides.
     ///
     /// Where more of them meet, those belong together that have their ends by the same indices.
-    fn new(shapes: &Shapes, topology: &Topology, mesh: usize) -> Self {
+    fn new(shapes: &Shapes, topology: &Topology, mesh: usize) -> Result<Self> {
         let own = shapes.meshes[mesh].triangles.clone();
         let first = own.start;
-        let mut parents: Vec<u32> = (0..own.len() as u32).collect();
-        let mut is_open = vec![false; own.len()];
+        let mut joined = Forest::new(own.len() as u32, "triangles")?;
+        let mut is_open = memory::filled(own.len(), false, "triangles")?;
         let mut around = Vec::new();
         for m in shapes.meshes[mesh].meshlets.clone() {
             let begin = |m: u32| shapes.meshlets[m as usize].triangles.start - first;
@@ -348,7 +357,7 @@ impl Parts {
                     if other.is_along {
                         [one, two].iter().for_each(|t| is_open[*t as usize] = true);
                     } else {
-                        unite(&mut parents, one, two);
+                        joined.join(one, two);
                     }
                     continue;
                 }
@@ -368,7 +377,7 @@ impl Parts {
                     let mut back = around.iter().filter(|(_, ends)| *ends == [*b, *a]);
                     let along = around.iter().filter(|(_, ends)| ends == &[*a, *b]).count();
                     match (back.next(), back.next(), along) {
-                        (Some((other, _)), None, 1) => unite(&mut parents, *t, *other),
+                        (Some((other, _)), None, 1) => joined.join(*t, *other),
                         _ => is_open[*t as usize] = true,
                     }
                 }
@@ -380,10 +389,10 @@ impl Parts {
                 is_open[(t - first) as usize] = true;
             }
         }
-        let mut sorted: Vec<(u32, u32)> =
-            (0..own.len() as u32).map(|t| (head(&mut parents, t), t + first)).collect();
+        let by_part = (0..own.len() as u32).map(|t| (joined.root(t), t + first));
+        let mut sorted = memory::collected(by_part, "triangles")?;
         sorted.sort_unstable();
-        Self { sorted, first, is_open }
+        Ok(Self { sorted, first, is_open })
     }
 
     /// The triangles of the small closed parts.
@@ -395,21 +404,6 @@ impl Parts {
             .filter(move |part| part.len() <= MAX_TRIANGLES && !is_open(part))
             .map(|part| part.iter().map(|(_, t)| *t).collect())
     }
-}
-
-/// The head of a triangle's part, which is its first triangle; shortens the way to it.
-fn head(parents: &mut [u32], mut t: u32) -> u32 {
-    while parents[t as usize] != t {
-        let next = parents[parents[t as usize] as usize];
-        parents[t as usize] = next;
-        t = next;
-    }
-    t
-}
-
-fn unite(parents: &mut [u32], a: u32, b: u32) {
-    let [a, b] = [a, b].map(|t| head(parents, t));
-    parents[a.max(b) as usize] = a.min(b);
 }
 
 /// A closed part, as a solid has it.
