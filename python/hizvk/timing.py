@@ -25,7 +25,8 @@ class StageTime:
     ``"cull members"``, ``"cull"`` (without groups), ``"list"``, ``"join"`` (of views), ``"among"``,
     ``"update"`` or ``"refine"``.
 
-    The host's rasteriser has no stage: its time is the host's own."""
+    The host's rasteriser has no stage, nor has a reduction that copies the levels which it has made:
+    their time is the host's own."""
     passes: int
     """How many passes it had."""
     gpu_ms: float | None

@@ -84,7 +84,7 @@ pub(crate) fn draw_frame(
     // Each frame: depth, pyramid, cull.
     let all = DrawOptions::default();
     hiz.record_occluder_depth(&mut encoder, &occluders, &camera, &depth, &all)?;
-    hiz.record_reduce(&mut encoder, depth.view(), &camera, &pyramid)?;
+    hiz.record_reduce(&mut encoder, &depth, &camera, &pyramid)?;
     let options = CullOptions::default();
     hiz.record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &options)?;
 

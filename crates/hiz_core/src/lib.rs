@@ -1,7 +1,7 @@
 //! Certified hierarchical-Z occlusion culling on wgpu.
 //!
 //! The data flows one way.
-//! Steps 1 to 6 are folders, in the order in which `lib.rs` declares them:
+//! Steps 1 to 6 are folders; each uses those before it, and `occluders` uses `pyramid`, too:
 //!
 //! 1. **Input** (`input`).
 //!    A [`Camera`] describes in float64 what is seen.
@@ -9,6 +9,7 @@
 //!    instances are.
 //! 2. **Occluders** (`occluders`).
 //!    [`Occluders`] are drawn into a depth texture, or the caller brings a depth texture.
+//!    A host that draws makes the pyramid's levels as well ([`HostLevels`]).
 //!    Their [`OccluderSurface`] makes a small depth image that also holds for larger images.
 //! 3. **Pyramid** (`pyramid`).
 //!    [`HizContext::record_reduce`] builds the [`Pyramid`]: for each level, the farthest depth of
@@ -133,7 +134,7 @@
 // Some items serve only a readback, so a build without `headless` never uses them.
 #![cfg_attr(not(feature = "headless"), allow(dead_code))]
 
-// The rooms, in the order of the data.
+// The rooms, in the order of the data, but for `occluders`, which makes levels of pyramids.
 // Each imports only from itself and from rooms declared before it; `tests/rooms.rs` checks that.
 // Empty lines keep rustfmt from sorting them.
 mod error;
@@ -144,9 +145,9 @@ mod input;
 
 mod gpu;
 
-mod occluders;
-
 mod pyramid;
+
+mod occluders;
 
 mod instances;
 
@@ -216,6 +217,7 @@ pub use output::views::{MAX_VIEWS, ViewsOutputs, VisibleViews};
 pub use output::visible::Visible;
 pub use pyramid::atlas::AtlasUse;
 pub use pyramid::ends::{DepthEnd, Depths};
+pub use pyramid::host_levels::HostLevels;
 pub use pyramid::level_texels::LevelTexels;
 pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
 pub use pyramid::mips::{MIP_CULL, MIP_LOOKUP};

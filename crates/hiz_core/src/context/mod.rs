@@ -72,7 +72,7 @@ use crate::gpu::device::Gpu;
 /// // Each frame:
 /// let all = DrawOptions::default();
 /// hiz.record_occluder_depth(&mut encoder, &occluders, &camera, &depth, &all)?;
-/// hiz.record_reduce(&mut encoder, depth.view(), &camera, &pyramid)?;
+/// hiz.record_reduce(&mut encoder, &depth, &camera, &pyramid)?;
 /// let options = CullOptions::default();
 /// hiz.record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &options)?;
 /// queue.submit([encoder.finish()]);

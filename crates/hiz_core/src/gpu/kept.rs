@@ -3,7 +3,7 @@
 use std::any::{Any, TypeId};
 use std::collections::HashMap;
 use std::hash::Hash;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use crate::error::Result;
 use crate::host::threads::Locked;
@@ -59,6 +59,44 @@ impl Ring {
     pub(crate) fn come_back(&self, encoder: &wgpu::CommandEncoder, buffer: &wgpu::Buffer) {
         let (ring, mapped) = (self.clone(), buffer.clone());
         encoder.map_buffer_on_submit(buffer, wgpu::MapMode::Write, .., move |outcome| {
+            if outcome.is_ok() {
+                ring.give(mapped);
+            }
+        });
+    }
+}
+
+/// A buffer of a ring that several recordings copy from, in encoders of their own.
+///
+/// It comes back, mapped, once nobody holds it and each recording is done or dropped.
+#[derive(Debug)]
+pub(crate) struct Lent {
+    buffer: wgpu::Buffer,
+    /// Weak, so that no buffer is mapped for a ring that is gone.
+    free: Weak<Locked<Vec<wgpu::Buffer>>>,
+    most: usize,
+}
+
+impl Lent {
+    /// Lends a buffer that is not mapped.
+    pub(crate) fn new(buffer: wgpu::Buffer, ring: &Ring) -> Arc<Self> {
+        Arc::new(Self { buffer, free: Arc::downgrade(&ring.free), most: ring.most })
+    }
+
+    /// The buffer, which the commands of `encoder` are about to read.
+    pub(crate) fn read_by(self: &Arc<Self>, encoder: &wgpu::CommandEncoder) -> &wgpu::Buffer {
+        // An encoder that is never submitted drops this, too.
+        let held = Arc::clone(self);
+        encoder.on_submitted_work_done(move || drop(held));
+        &self.buffer
+    }
+}
+
+impl Drop for Lent {
+    fn drop(&mut self) {
+        let Some(free) = self.free.upgrade() else { return };
+        let (ring, mapped) = (Ring { free, most: self.most }, self.buffer.clone());
+        self.buffer.map_async(wgpu::MapMode::Write, .., move |outcome| {
             if outcome.is_ok() {
                 ring.give(mapped);
             }

@@ -215,6 +215,9 @@ impl StageTimer {
 pub struct StageTime {
     /// `"raster"`, `"resolve"` (of samples), `"reduce"`, `"cull groups"`, `"cull members"`, `"cull"`
     /// (without groups), `"list"`, `"join"` (of views), `"among"`, `"update"` or `"refine"`.
+    ///
+    /// Copies are no passes: what the host has drawn, and the levels that it has made
+    /// ([`HostLevels`](crate::HostLevels)), have no stage.
     pub stage: &'static str,
     /// How many passes it had.
     pub passes: u32,

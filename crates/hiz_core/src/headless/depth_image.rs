@@ -82,6 +82,8 @@ impl DepthImage {
     pub fn texture(&self) -> &wgpu::Texture {
         if let Some(drawn) = &self.drawn {
             self.engine.images().keep_apart(drawn);
+            // The caller may write into the texture, too.
+            drawn.levels().inspect(|levels| levels.turn_off());
         }
         &self.texture
     }
@@ -91,7 +93,8 @@ impl DepthImage {
         let Self { tolerance, near_slack, samples, .. } = *self;
         let nearest = self.nearest.as_ref();
         let whole = DepthSource::from(&self.texture);
-        DepthSource { tolerance, near_slack, samples, nearest, ..whole }
+        let levels = self.drawn.as_ref().and_then(|drawn| drawn.levels());
+        DepthSource { tolerance, near_slack, samples, nearest, levels, ..whole }
     }
 
     /// Checks that it tells what a pyramid of `depths` has to know.

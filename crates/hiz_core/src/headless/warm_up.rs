@@ -19,6 +19,7 @@ use crate::instances::update::record_idle_update;
 use crate::occluders::uploaded::Occluders;
 use crate::output::outputs::Outputs;
 use crate::output::views::ViewsOutputs;
+use crate::pyramid::reduce::record_idle_reduce;
 use crate::pyramid::{Pyramid, PyramidOptions};
 
 /// What the frames of an [`Engine::warm_up`] do beside one cull; nothing by default.
@@ -104,8 +105,10 @@ impl Engine {
             self.cull_views(instances, &views, options, &outputs, &extras)?.masks()?;
         }
         self.scoped(|| {
-            let mut encoder = self.encoder("hiz.update.warm_up");
-            record_idle_update(&self.context().gpu, &mut encoder, instances)?;
+            let (gpu, mut encoder) = (&self.context().gpu, self.encoder("hiz.update.warm_up"));
+            record_idle_update(gpu, &mut encoder, instances)?;
+            // The host may have made this pyramid's levels, and leave later ones to the device.
+            record_idle_reduce(gpu, &mut encoder, &depth.source(), camera, &pyramid)?;
             self.queue().submit([encoder.finish()]);
             Ok(())
         })?;

@@ -11,6 +11,8 @@ use crate::occluders::device_raster::{OCCLUDER_DEPTH_FORMAT, record_occluders};
 use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
 use crate::occluders::host_raster::{HostRaster, Way};
 use crate::occluders::uploaded::Occluders;
+use crate::pyramid::host_levels::HostLevels;
+use crate::pyramid::source::DepthSource;
 
 /// Staging buffers that an image keeps: two frames may be on their way.
 const STAGING_KEPT: usize = 2;
@@ -18,12 +20,12 @@ const STAGING_KEPT: usize = 2;
 /// A depth image for occluders, made once and drawn each frame.
 ///
 /// [`HizContext::record_occluder_depth`](crate::HizContext::record_occluder_depth) draws into it,
-/// and [`HizContext::record_reduce`](crate::HizContext::record_reduce) takes its
-/// [`view`](Self::view).
+/// and [`HizContext::record_reduce`](crate::HizContext::record_reduce) takes it.
 ///
 /// The device's rasteriser draws into a `Depth32Float` texture.
 /// The host's draws into memory, and its rows are copied into an `Rgba32Uint` texture of four
 /// pixels per texel.
+/// The host makes the levels of a pyramid with them, which a reduction copies ([`HostLevels`]).
 ///
 /// # Examples
 /// ```
@@ -51,7 +53,7 @@ const STAGING_KEPT: usize = 2;
 /// // Each frame:
 /// let all = DrawOptions::default();
 /// hiz.record_occluder_depth(&mut encoder, &occluders, &camera, &depth, &all)?;
-/// hiz.record_reduce(&mut encoder, depth.view(), &camera, &pyramid)?;
+/// hiz.record_reduce(&mut encoder, &depth, &camera, &pyramid)?;
 /// # queue.submit([encoder.finish()]);
 /// # engine.wait()?;
 /// # Ok::<(), hiz_core::Error>(())
@@ -66,6 +68,8 @@ pub struct OccluderDepth {
     host: Option<Locked<HostImage>>,
     /// Buffers through which rows come to the texture.
     staging: RowStaging,
+    /// Levels that the host makes with the image.
+    levels: Option<HostLevels>,
     /// Held from the recording to the submit by those who submit, so that drawings keep their order.
     pub(crate) submitting: Locked<()>,
 }
@@ -110,9 +114,11 @@ impl OccluderDepth {
         let view = gpu.view(&texture)?;
         let host = on_host
             .then(|| Locked::new(HostImage { raster: HostRaster::new(size), convention: None }));
+        let levels = host.as_ref().and_then(|_| HostLevels::new(gpu, &texture, size));
         Ok(Self {
             context: gpu.id(),
             size,
+            levels,
             texture,
             view,
             host,
@@ -136,9 +142,17 @@ impl OccluderDepth {
         &self.texture
     }
 
-    /// The view that [`HizContext::record_reduce`](crate::HizContext::record_reduce) reads.
+    /// A view of all of it.
+    ///
+    /// As the source of a reduction it lacks the levels that `&depth` has: pass it where something
+    /// else was written into the texture.
     pub fn view(&self) -> &wgpu::TextureView {
         &self.view
+    }
+
+    /// Levels that the host makes with the image, if it draws it.
+    pub(crate) fn levels(&self) -> Option<&HostLevels> {
+        self.levels.as_ref()
     }
 
     /// Records the drawing of `occluders`.
@@ -198,13 +212,16 @@ impl OccluderDepth {
             None => 0..0,
         };
         if !rows.is_empty() {
-            self.record_rows(gpu, encoder, &image.raster, convention, rows)?;
+            // What is added to an image changes few of its levels; a reduction of that part does.
+            let is_anew = options.load == DepthLoad::Clear;
+            self.record_rows(gpu, encoder, &image.raster, convention, rows, is_anew)?;
         }
         image.convention = Some(convention);
         Ok(touched)
     }
 
-    /// Records the copy of rows of the host's image into the texture.
+    /// Records the copy of rows of the host's image into the texture, and of its levels, if the
+    /// rows are all of an image that was drawn anew.
     fn record_rows(
         &self,
         gpu: &Gpu,
@@ -212,10 +229,30 @@ impl OccluderDepth {
         raster: &HostRaster,
         convention: DepthConvention,
         rows: std::ops::Range<u32>,
+        is_anew: bool,
     ) -> Result<()> {
+        let levels = match &self.levels {
+            Some(levels) if is_anew => levels.begin(gpu, convention)?,
+            _ => None,
+        };
         let part = (&self.texture, rows.clone(), self.size.height);
         self.staging.record(gpu, encoder, part, |mapped, pitch| {
-            raster.write_rows(|part| mapped.range(part), pitch, convention, &rows)
-        })
+            let open = |part| mapped.range(part);
+            raster.write_rows(open, pitch, convention, &rows, levels.as_ref())
+        })?;
+        match (levels, &self.levels) {
+            (Some(made), _) => made.record(gpu, encoder),
+            (None, Some(levels)) => levels.retract(gpu, encoder),
+            (None, None) => Ok(()),
+        }
+    }
+}
+
+impl<'a> From<&'a OccluderDepth> for DepthSource<'a> {
+    /// What was drawn, with the levels that the host has made of it.
+    ///
+    /// Where something else was written into the texture, too, take the texture as the source.
+    fn from(depth: &'a OccluderDepth) -> Self {
+        Self { levels: depth.levels(), ..Self::from(&depth.texture) }
     }
 }

@@ -14,7 +14,9 @@ impl<T: std::fmt::Debug + Send + Sync> Owner for T {}
 /// The depth image of a reduction, and what a cull has to know about it.
 #[derive(Debug, Clone)]
 pub(crate) struct Built {
-    /// The number of the reduction; once that has run, the pyramid's header holds it.
+    /// The number of the reduction, or of the drawing whose levels were copied.
+    ///
+    /// Once that has run, the pyramid's header holds it.
     pub(crate) reduction: u32,
     pub(crate) source: wgpu::TextureView,
     /// The image of the nearest samples, where `source` has the farthest of several.

@@ -70,7 +70,7 @@ const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4;
 /// The first one holds the number of the reduction that filled the pyramid.
 /// A cull that expects another number keeps everything: its reduction was not submitted before it.
 /// Buffers start as 0, which is never a number of a reduction.
-const HEADER_WORDS: u64 = 4;
+pub(crate) const HEADER_WORDS: u64 = 4;
 
 /// The side in texels, as a power of two, of the block that an invocation of the reduction reads.
 ///

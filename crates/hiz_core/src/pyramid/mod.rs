@@ -11,6 +11,7 @@
 //!    `reduce` records the passes that fill the levels from it; `steps` holds what the passes bind,
 //!    and `built` remembers the image.
 //!    `region` does the same for a part that has changed.
+//!    `host_levels` are made by a host that draws the image (`host_reduce`), and copied instead.
 //! 4. `atlas` copies all levels into one texture for large culls.
 //! 5. `mips` is a texture with mip levels, for shaders of the caller's own: `mips_plan` plans it,
 //!    `mips_bindings` holds what its passes bind, and `mips_passes` records them.
@@ -22,6 +23,8 @@ pub(crate) mod atlas;
 pub(crate) mod blocks;
 pub(crate) mod built;
 pub(crate) mod ends;
+pub(crate) mod host_levels;
+pub(crate) mod host_reduce;
 pub(crate) mod layout;
 pub(crate) mod level_texels;
 pub(crate) mod levels;
@@ -29,6 +32,7 @@ pub(crate) mod mips;
 pub(crate) mod mips_bindings;
 pub(crate) mod mips_passes;
 pub(crate) mod mips_plan;
+mod numbering;
 pub(crate) mod receiver_mask;
 pub(crate) mod reduce;
 pub(crate) mod region;
@@ -164,6 +168,9 @@ pub struct Pyramid {
     /// Whether the depth image has far pixels that may have no depth; its conversion lost which.
     #[cfg(feature = "headless")]
     pub(crate) no_data_is_far: AtomicBool,
+    /// Whether the last reduction copies levels of the host's.
+    #[cfg(feature = "testing")]
+    are_copied: AtomicBool,
     /// The last reduction that is known to have run; one that was only recorded may never run.
     reduced: Arc<AtomicU32>,
     /// The view of a cull, for instances and for groups.
@@ -232,6 +239,8 @@ impl Pyramid {
             submitting: Locked::default(),
             #[cfg(feature = "headless")]
             no_data_is_far: AtomicBool::new(false),
+            #[cfg(feature = "testing")]
+            are_copied: AtomicBool::new(false),
             reduced: Arc::default(),
             // Culls read each image, or the atlas.
             view: RecordedUniform::new(gpu, "hiz.cull.view_uniform", KEPT_IMAGES + 1)?,
@@ -389,6 +398,12 @@ impl Pyramid {
             ),
             other => other,
         })
+    }
+
+    /// Whether the last reduction that was recorded copies levels that the host has made.
+    #[cfg(feature = "testing")]
+    pub fn has_host_levels(&self) -> bool {
+        self.are_copied.load(Ordering::Relaxed)
     }
 
     /// The buffer of chunk `i`, or a stand-in if the pyramid has fewer chunks.

@@ -3,8 +3,9 @@
 //! Each pass reads one level, and writes up to three coarser ones, or all of the rest.
 //! The passes follow AMD's Single Pass Downsampler (SPD, 2020).
 //! `shaders/pyramid/reduce.wgsl` says where they differ from it.
+//! Levels that the host has made with the image are copied instead (`host_levels`).
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::Ordering;
 
 use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
@@ -19,7 +20,9 @@ use crate::input::image::ImageSize;
 use crate::pyramid::blocks::Blocks;
 use crate::pyramid::built::Built;
 use crate::pyramid::ends::Depths;
+use crate::pyramid::host_levels::Copied;
 use crate::pyramid::layout::Step;
+use crate::pyramid::numbering::next_number;
 use crate::pyramid::source::{DepthSource, Part, Sampling};
 use crate::pyramid::steps::{Recording, STEP_BINDINGS, Staged, Steps};
 use crate::pyramid::{BoundSource, Pyramid};
@@ -172,23 +175,14 @@ impl Prepared {
         Ok(Self { source, dispatches, built })
     }
 
-    /// Checks the arguments of [`record_reduce`], and makes what the reduction `number` needs.
+    /// Makes what the reduction `number` of all of an image needs.
     fn of_all(
         gpu: &Gpu,
-        depth: &DepthSource<'_>,
+        part: Part,
         camera: &Camera,
         pyramid: &Pyramid,
         number: u32,
     ) -> Result<Self> {
-        gpu.check_context("pyramid", pyramid.context)?;
-        let size = pyramid.size();
-        let part = Part::new(depth, Sampling::Single, (size, "pyramid"), pyramid.depths())?;
-        if size != camera.size() {
-            return Err(Error::mismatch(
-                "camera",
-                format!("expected the depth image's size {size}, got {}", camera.size()),
-            ));
-        }
         let blocks: Vec<_> = pyramid.layout.steps.iter().map(Blocks::all).collect();
         Self::new(gpu, (part, camera.clone(), number), (&blocks, false), pyramid)
     }
@@ -212,6 +206,20 @@ impl Prepared {
     }
 }
 
+/// Checks the arguments of [`record_reduce`]; returns the image that is reduced.
+fn checked(gpu: &Gpu, depth: &DepthSource<'_>, camera: &Camera, pyramid: &Pyramid) -> Result<Part> {
+    gpu.check_context("pyramid", pyramid.context)?;
+    let size = pyramid.size();
+    let part = Part::new(depth, Sampling::Single, (size, "pyramid"), pyramid.depths())?;
+    if size != camera.size() {
+        return Err(Error::mismatch(
+            "camera",
+            format!("expected the depth image's size {size}, got {}", camera.size()),
+        ));
+    }
+    Ok(part)
+}
+
 /// Records the reduction of `depth` into `pyramid`.
 ///
 /// # Errors
@@ -224,12 +232,50 @@ pub(crate) fn record_reduce(
     pyramid: &Pyramid,
 ) -> Result<()> {
     // Everything that can fail comes before the first command is recorded.
-    let reduction = next_reduction();
-    let prepared = Prepared::of_all(gpu, depth, camera, pyramid, reduction)?;
+    let part = checked(gpu, depth, camera, pyramid)?;
+    let levels = depth.levels.and_then(|levels| {
+        levels.for_pyramid(&part.subresource.texture, camera.convention(), &pyramid.layout)
+    });
+    if let Some(levels) = levels {
+        return record_copies(gpu, encoder, (part, camera), pyramid, &levels);
+    }
+    let reduction = next_number();
+    let prepared = Prepared::of_all(gpu, part, camera, pyramid, reduction)?;
     let numbers = Recording { reduction, base: 0, origin: prepared.built.part.origin };
     let staged = Steps::numbers(gpu, &pyramid.layout.steps, &numbers)?;
     let header = Some(&pyramid.chunks[0]);
     finish(gpu, encoder, pyramid, prepared, (&pyramid.steps, staged, header))
+}
+
+/// Records the copies of levels that the host has made, as the reduction of `part`.
+///
+/// The pyramid has the number of the drawing then.
+fn record_copies(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    (part, camera): (Part, &Camera),
+    pyramid: &Pyramid,
+    levels: &Copied<'_>,
+) -> Result<()> {
+    let (_, source, nearest) = source_bindings(gpu, &part, pyramid)?;
+    gpu.recorded(|| {
+        levels.record(encoder, &pyramid.chunks[0]);
+        Ok(())
+    })?;
+    let (camera, reduction) = (camera.clone(), levels.number);
+    note(encoder, pyramid, Built { reduction, source, nearest, part, camera, owner: None });
+    #[cfg(feature = "testing")]
+    pyramid.are_copied.store(true, Ordering::Relaxed);
+    Ok(())
+}
+
+/// Notes what a pyramid is built from, by commands that are recorded.
+fn note(encoder: &wgpu::CommandEncoder, pyramid: &Pyramid, built: Built) {
+    #[cfg(feature = "testing")]
+    pyramid.are_copied.store(false, Ordering::Relaxed);
+    let (reduced, reduction) = (pyramid.reduced(), built.reduction);
+    encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
+    pyramid.set_built(built);
 }
 
 /// Records a reduction that is prepared, and notes what the pyramid is built from.
@@ -246,9 +292,7 @@ pub(super) fn finish(
         prepared.record(encoder, steps, |workgroups| workgroups.map(|n| n.max(1)));
         Ok(())
     })?;
-    let (reduced, reduction) = (pyramid.reduced(), prepared.built.reduction);
-    encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
-    pyramid.set_built(prepared.built);
+    note(encoder, pyramid, prepared.built);
     Ok(())
 }
 
@@ -264,7 +308,8 @@ pub(crate) fn record_idle_reduce(
     camera: &Camera,
     pyramid: &Pyramid,
 ) -> Result<Built> {
-    let prepared = Prepared::of_all(gpu, depth, camera, pyramid, 0)?;
+    let part = checked(gpu, depth, camera, pyramid)?;
+    let prepared = Prepared::of_all(gpu, part, camera, pyramid, 0)?;
     gpu.recorded(|| {
         prepared.record(encoder, &pyramid.steps, |_| [0, 0]);
         Ok(())
@@ -352,10 +397,4 @@ fn shape_of(step: &Step, blocks: [u32; 2], tall: bool) -> (Shape, [u32; 2]) {
 /// - Rows that begin at multiples of a page, which would all fall into the same lines of a cache.
 fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
     (!source.is_packed() || step.is_coarse()) && !size.width.is_multiple_of(PAGE_PIXELS)
-}
-
-/// A new number for a reduction, never 0.
-pub(super) fn next_reduction() -> u32 {
-    static NEXT: AtomicU32 = AtomicU32::new(1);
-    NEXT.fetch_add(1, Ordering::Relaxed).max(1)
 }

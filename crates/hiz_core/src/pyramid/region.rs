@@ -9,7 +9,8 @@ use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::pyramid::Pyramid;
 use crate::pyramid::blocks::{Blocks, touched_blocks};
-use crate::pyramid::reduce::{Prepared, finish, next_reduction};
+use crate::pyramid::numbering::next_number;
+use crate::pyramid::reduce::{Prepared, finish};
 use crate::pyramid::source::{DepthSource, Part, Sampling};
 use crate::pyramid::steps::{Recording, Steps};
 
@@ -43,7 +44,7 @@ pub(crate) fn record_reduce_region(
     check_rectangle(rectangle, pyramid.size())?;
     // Everything that can fail comes before the first command is recorded.
     let numbers =
-        Recording { reduction: next_reduction(), base: built.reduction, origin: part.origin };
+        Recording { reduction: next_number(), base: built.reduction, origin: part.origin };
     let layout = &pyramid.layout;
     let blocks = touched_blocks(layout, rectangle);
     let steps = made(&pyramid.part_steps, || Steps::new(gpu, &layout.steps))?;

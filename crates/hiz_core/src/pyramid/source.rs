@@ -7,6 +7,7 @@ use crate::input::image::ImageSize;
 use crate::input::near_slack::NearSlack;
 use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::ends::Depths;
+use crate::pyramid::host_levels::HostLevels;
 
 /// For how many depth images bind groups are kept, by reductions, culls and other stages.
 /// A renderer may alternate between a few.
@@ -26,6 +27,7 @@ pub(super) const KEPT_IMAGES: usize = 3;
 /// | one mip level | [`mip_level`](Self::mip_level) |
 /// | split screen, dynamic resolution | [`origin`](Self::origin) and [`size`](Self::size) |
 /// | multisampled depth | what [`record_resolve`](crate::HizContext::record_resolve) returns |
+/// | occluders alone | a `&`[`OccluderDepth`](crate::OccluderDepth) |
 ///
 /// # Examples
 /// The right half of a split screen:
@@ -91,6 +93,11 @@ pub struct DepthSource<'a> {
     /// Both are as [`record_resolve`](crate::HizContext::record_resolve) makes them, for pyramids
     /// that have the nearest depths, too.
     pub nearest: Option<&'a wgpu::Texture>,
+    /// Levels that the host has made when it drew the image in `texture`.
+    ///
+    /// A reduction of farthest depths copies them instead of making them; the bits are the same.
+    /// A `&`[`OccluderDepth`](crate::OccluderDepth) as the source has them.
+    pub levels: Option<&'a HostLevels>,
 }
 
 impl<'a> From<&'a wgpu::Texture> for DepthSource<'a> {
@@ -106,6 +113,7 @@ impl<'a> From<&'a wgpu::Texture> for DepthSource<'a> {
             tolerance: DepthTolerance::NONE,
             near_slack: NearSlack::NONE,
             nearest: None,
+            levels: None,
         }
     }
 }

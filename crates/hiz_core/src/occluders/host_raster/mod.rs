@@ -80,6 +80,7 @@ use crate::occluders::host_raster::vertices::Vertices;
 use crate::occluders::host_raster::written::write;
 use crate::occluders::meshlets::{LANES, Meshlet, PART_GROUPS};
 use crate::occluders::shapes::Shapes;
+use crate::pyramid::host_levels::LevelRows;
 
 /// A depth image on the host, in the form that the rasteriser draws into.
 #[derive(Debug)]
@@ -308,7 +309,7 @@ impl HostRaster {
             .collect();
         on_threads(threads, parts, |(panes, rows, part)| {
             let out = wgpu::WriteOnly::from_mut(part);
-            write(&self.image, panes, out, pitch, rows, convention);
+            write(&self.image, panes, out, pitch, rows, convention, |_, _, _| ());
         });
     }
 
@@ -317,26 +318,37 @@ impl HostRaster {
     /// `open` opens a range of the bytes that begin with the first of these rows.
     /// Where the pitch has room, a row ends at a multiple of 4 pixels; those past the width repeat
     /// the last one.
+    /// `levels` are made of them, too, if these are all rows.
     ///
     /// # Errors
-    /// The first one of `open`.
+    /// The first one of `open` or of `levels`.
     pub(crate) fn write_rows(
         &self,
         open: impl Fn(Range<u64>) -> Result<wgpu::BufferViewMut> + Sync,
         pitch: usize,
         convention: DepthConvention,
         rows: &Range<u32>,
+        levels: Option<&LevelRows<'_>>,
     ) -> Result<()> {
         let threads = worth_it(self.writing_ns(rows.len() as u64));
         let failed = Locked::new(None);
         let parts: Vec<_> = self.panes.in_rows(rows).collect();
-        on_threads(threads, parts, |(panes, part)| {
+        let write_part = |panes: &[Pane], part: Range<i32>| {
             let byte = |row: i32| ((row - rows.start as i32) as usize * pitch) as u64;
-            match open(byte(part.start)..byte(part.end)) {
-                Ok(mut view) => {
-                    write(&self.image, panes, view.slice(..), pitch, part, convention);
+            let mut view = open(byte(part.start)..byte(part.end))?;
+            let image_rows = part.start as u32..part.end as u32;
+            let mut levels = levels.map(|levels| levels.part(image_rows)).transpose()?;
+            let also = |top: i32, lines: &[f32], wide: usize| {
+                if let Some(levels) = &mut levels {
+                    levels.add(top as u32, bytemuck::cast_slice(lines), wide);
                 }
-                Err(error) => *failed.lock() = Some(error),
+            };
+            write(&self.image, panes, view.slice(..), pitch, part, convention, also);
+            Ok(())
+        };
+        on_threads(threads, parts, |(panes, part)| {
+            if let Err(error) = write_part(panes, part) {
+                *failed.lock() = Some(error);
             }
         });
         let failed = failed.lock().take();

@@ -264,7 +264,8 @@ impl OneByOne {
         let pitch = self.image.width as usize * size_of::<f32>();
         let bytes = wgpu::WriteOnly::from_mut(bytemuck::cast_slice_mut(out));
         let panes = std::slice::from_ref(&self.pane);
-        write(&self.image, panes, bytes, pitch, 0..self.image.height, convention);
+        let rows = 0..self.image.height;
+        write(&self.image, panes, bytes, pitch, rows, convention, |_, _, _| ());
     }
 }
 

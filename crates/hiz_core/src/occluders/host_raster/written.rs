@@ -13,6 +13,8 @@ use crate::occluders::host_raster::tile::SIDE;
 ///
 /// `out` begins at the first of the rows, and they are `pitch` bytes apart.
 /// A row ends at a multiple of 4 pixels; those past the width repeat the last one.
+/// `also` gets each row of tiles while it is in the caches: the image's row where it begins, and
+/// the rows of depths with their distance.
 pub(super) fn write(
     image: &Image,
     panes: &[Pane],
@@ -20,15 +22,16 @@ pub(super) fn write(
     pitch: usize,
     rows: Range<i32>,
     convention: DepthConvention,
+    also: impl FnMut(i32, &[f32], usize),
 ) {
     match convention {
         DepthConvention::Reversed => widest(
             #[inline(always)]
-            || write_as(image, panes, out, pitch, rows, |nearness| nearness),
+            || write_as(image, panes, out, pitch, rows, |nearness| nearness, also),
         ),
         DepthConvention::Standard => widest(
             #[inline(always)]
-            || write_as(image, panes, out, pitch, rows, |nearness| 1.0 - nearness),
+            || write_as(image, panes, out, pitch, rows, |nearness| 1.0 - nearness, also),
         ),
     }
 }
@@ -41,6 +44,7 @@ fn write_as(
     pitch: usize,
     rows: Range<i32>,
     depth_of: impl Fn(f32) -> f32 + Copy,
+    mut also: impl FnMut(i32, &[f32], usize),
 ) {
     let width = image.width as usize;
     let end = width.next_multiple_of(4).min(pitch / size_of::<f32>());
@@ -63,5 +67,6 @@ fn write_as(
             let at = (y - first) as usize * pitch;
             out.slice(at..at + bytes.len()).copy_from_slice(bytes);
         }
+        also(top + row * STEP, &lines, wide);
     }
 }
