@@ -295,6 +295,12 @@ class CullOptions:
         65536.
         0 means none.
         With enough of them the answer is that of a test at full resolution.
+
+        On processors (lavapipe, SwiftShader) a test reads at most 7,551 of them, with
+        ``fit="volume"`` 943, with a pyramid of both ends 3,775 and 839, and more are kept where
+        these do not suffice.
+        lavapipe ends longer loops and loses what they had left to do (docs/accuracy.md, "Loops that
+        a driver ends").
     fit : "rectangle" or "volume"
         What stands for the bounds.
         ``"rectangle"``: the rectangle around their projection, at their nearest depth.

@@ -41,42 +41,61 @@ fn levels_down(level: u32) -> u32 {
     return select(1u, level, level <= first_stored);
 }
 
-// The same up to the next coarser one.
-fn levels_up(level: u32) -> u32 {
-    return select(1u, first_stored, level == 0u);
+// The bits at which a column, or row, has a next sibling that is not beyond `end`.
+// Bit k stands for the one k levels up.
+fn siblings(at: u32, end: u32) -> u32 {
+    // Up to their highest different bit `at` is less than `end`, above it they are equal.
+    let apart = at ^ end;
+    return select((2u << leading_bit(apart | 1u)) - 1u, 0u, apart == 0u) & ~at;
 }
 
 // Moves a walk on to the next sibling, or to that of the first parent that has one.
 // The walk is over the rectangle first..=last, and began at the texels t of the level `top`.
 // False: there is none, so it is over.
+//
+// The parent is found without a loop, because the loops of an invocation are limited
+// (`crates/hiz_core/src/cull/descent.rs`).
 fn next_texel(
     top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>,
     level: ptr<function, u32>, place: ptr<function, vec2<u32>>,
 ) -> bool {
-    loop {
-        let at = *place;
-        let end = last >> vec2<u32>(*level);
-        if *level == top {
-            if at.x < t.z {
-                (*place).x = at.x + 1u;
-                return true;
-            }
-            *place = vec2<u32>(t.x, at.y + 1u);
-            return at.y < t.w;
-        }
-        let up = levels_up(*level);
+    var at = *place;
+    var here = *level;
+    if here == 0u && top > 0u {
+        // The parents of pixels are on the first stored level, whatever that is.
         // The number of the last column, and row, among a parent's children.
-        let last_child = (1u << up) - 1u;
-        if (at.x & last_child) < last_child && at.x < end.x {
+        let last_child = (1u << first_stored) - 1u;
+        if (at.x & last_child) < last_child && at.x < last.x {
             (*place).x = at.x + 1u;
             return true;
         }
-        if (at.y & last_child) < last_child && at.y < end.y {
-            *place = vec2<u32>(max(at.x & ~last_child, first.x >> *level), at.y + 1u);
+        if (at.y & last_child) < last_child && at.y < last.y {
+            *place = vec2<u32>(max(at.x & ~last_child, first.x), at.y + 1u);
             return true;
         }
-        *place = at >> vec2<u32>(up);
-        *level += up;
+        at >>= vec2<u32>(first_stored);
+        here = first_stored;
     }
-    return false;
+    // From here on parents are one level apart.
+    let end = last >> vec2<u32>(here);
+    let right = siblings(at.x, end.x);
+    let below = siblings(at.y, end.y);
+    let left = top - here;
+    let up = min(countTrailingZeros((right | below) | (1u << left)), left);
+    at >>= vec2<u32>(up);
+    *level = here + up;
+    if up == left {
+        if at.x < t.z {
+            *place = vec2<u32>(at.x + 1u, at.y);
+            return true;
+        }
+        *place = vec2<u32>(t.x, at.y + 1u);
+        return at.y < t.w;
+    }
+    if ((right >> up) & 1u) != 0u {
+        *place = vec2<u32>(at.x + 1u, at.y);
+    } else {
+        *place = vec2<u32>(max(at.x & ~1u, first.x >> *level), at.y + 1u);
+    }
+    return true;
 }

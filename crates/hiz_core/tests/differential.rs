@@ -127,6 +127,25 @@ fn assert_grouped(name: &str, report: &Report) {
     );
 }
 
+/// A round of the soak whose walks were longer than llvmpipe's loops (`src/cull/descent.rs`).
+#[test]
+fn no_contradiction_in_a_round_of_long_walks() {
+    let campaign = Campaign {
+        seed: 1031,
+        rounds: 4,
+        volumes: 64,
+        coverage: Coverage::Sample,
+        modes: FITTED,
+        fit: Fit::Volume,
+        levels: MISSING_LEVELS,
+        groups: true,
+        ..Campaign::default()
+    };
+    let round = campaign.round(57).expect("a camera that float32 holds");
+    let (_, tested) = round.grouped_masks(&engine()).expect("a camera that float32 holds");
+    assert_eq!(tested.contradictions, 0, "{tested:?}");
+}
+
 #[test]
 fn little_that_is_hidden_is_kept() {
     let report =

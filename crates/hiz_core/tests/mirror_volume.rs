@@ -158,10 +158,10 @@ const MORE_FAULTS: &[Fault] = &[
             ("select(-BEYOND, low, surely_above(r, low, w))", "low"),
         ],
     ),
-    ("a column's fall alone", &[("plane.offset - fall.x - fall.y", "plane.offset - fall.x")]),
+    ("a column's fall alone", &[("plane.offset - fall_x - fall_y", "plane.offset - fall_x")]),
     (
         "an offset of 0 for edges",
-        &[("slope, guess.facing, offset)", "slope, guess.facing, abs(guess.facing) * offset)")],
+        &[("offset[k] = offset;", "offset[k] = abs(guess.facing) * offset;")],
     ),
     (
         "a texel's first pixel alone",
@@ -174,12 +174,12 @@ const MORE_FAULTS: &[Fault] = &[
         "another plane's offset",
         &[(
             "let plane = (*planes).list[i];",
-            "var plane = (*planes).list[i]; plane.offset = (*planes).list[0].offset;",
+            "var plane = (*planes).list[i]; plane.offset = vec4<f32>((*planes).list[0].offset.x);",
         )],
     ),
     (
         "one side for both axes",
-        &[("plane.slope > vec2<f32>(0.0)", "vec2<bool>(plane.slope.x > 0.0)")],
+        &[("let is_below = plane.slope_y > vec4<f32>(0.0);", "let is_below = is_right;")],
     ),
     (
         "no certificate, no margin",
@@ -197,7 +197,10 @@ const MORE_FAULTS: &[Fault] = &[
     ),
     (
         "a descent that forgets a row",
-        &[("if (at.y & last_child) < last_child && at.y < end.y {", "if false {")],
+        &[
+            ("if (at.y & last_child) < last_child && at.y < last.y {", "if false {"),
+            ("let below = siblings(at.y, end.y);", "let below = 0u;"),
+        ],
     ),
 ];
 

@@ -324,8 +324,13 @@ fn the_guard_stands_in_the_block_certificates_too() {
 
 #[test]
 fn a_descent_that_forgets_a_column() {
-    let fault = ("if (at.x & last_child) < last_child && at.x < end.x {", "if false {");
-    assert_red_with("descent", &[fault], &[(Footprint::Two, 4096)]);
+    let faults = [
+        ("if (at.x & last_child) < last_child && at.x < last.x {", "if false {"),
+        ("let right = siblings(at.x, end.x);", "let right = 0u;"),
+    ];
+    for fault in faults {
+        assert_red_with("descent", &[fault], &[(Footprint::Two, 4096)]);
+    }
 }
 
 /// A level that is too fine for a rectangle, or that is not stored.
@@ -338,7 +343,11 @@ fn wrong_levels_where_some_are_missing() {
         (chosen, "select(first_stored, 0u, level == 0u)", PLAIN),
         (chosen, "select(clamp(level - 1u, first_stored, last_stored), 0u, level <= 1u)", PLAIN),
         (chosen, "level", PLAIN),
-        ("let last_child = (1u << up) - 1u;", "let last_child = 1u;", &[(Footprint::Two, 4096)]),
+        (
+            "let last_child = (1u << first_stored) - 1u;",
+            "let last_child = 1u;",
+            &[(Footprint::Two, 4096)],
+        ),
         ("select(1u, level, level <= first_stored)", "1u", &[(Footprint::Two, 4096)]),
     ] {
         let campaign =

@@ -4,6 +4,7 @@
 //! A number goes into the view uniform, and a choice into the key of the pipelines.
 
 use crate::cull::among::Among;
+use crate::cull::descent::most_on_processors;
 use crate::cull::groups::group_descent;
 use crate::cull::options::{Coverage, CullOptions, Fit};
 use crate::cull::pipelines::{CullKey, Decision, DepthStore};
@@ -114,7 +115,7 @@ impl PreparedView {
             None => pyramid.built_for(camera)?,
         };
         // Bad options are refused before anything is recorded.
-        let view = ViewUniform {
+        let mut view = ViewUniform {
             source_origin: packed(built.part.origin),
             ..ViewUniform::new(
                 camera,
@@ -130,6 +131,10 @@ impl PreparedView {
                 built.part.tolerance,
             )
         };
+        if gpu.is_processor() {
+            let most = most_on_processors(options.fit, pyramid.has_nearest());
+            view.descent_budget = view.descent_budget.min(most);
+        }
         if options.shadow.is_some() {
             check_receivers(pyramid.depths())?;
         } else {

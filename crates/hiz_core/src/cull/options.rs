@@ -165,6 +165,12 @@ pub struct CullOptions {
     /// How many texels of finer levels a test may read if the footprint cannot decide, 0..=65536.
     /// 0: none.
     /// With enough of them, the answer is that of a rectangle test at full resolution.
+    ///
+    /// On processors (lavapipe, SwiftShader) a test reads at most 7,551 of them, with
+    /// [`Fit::Volume`] 943, with a pyramid of both ends 3,775 and 839, and more are kept where these
+    /// do not suffice.
+    /// lavapipe ends longer loops and loses what they had left to do (docs/accuracy.md, "Loops that
+    /// a driver ends").
     pub descent: u32,
     /// What stands for a volume in the comparison with the depth image.
     pub fit: Fit,

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::declared;
 use crate::cull::among;
 use crate::cull::count;
+use crate::cull::descent;
 use crate::cull::explain::{self, Stage};
 use crate::cull::full_mask;
 use crate::cull::groups::GROUPS_OF_RUN;
@@ -139,6 +140,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/groups", "ACCEPTED", int(1 << 31)),
         ("instances/groups", "GROUP", GROUP as f64),
         ("instances/groups", "GROUP_LOG2", f64::from(GROUP.ilog2())),
+        ("cull/supporting_planes", "PLANES_OF_ROUND", int(descent::PLANES_OF_ROUND)),
+        ("cull/supporting_planes", "MOST_ROUNDS", int(descent::MOST_ROUNDS)),
         ("instances/groups", "RUN", int(GROUPS_OF_RUN)),
         ("instances/groups", "SHARE", GROUP as f64 / int(GROUPS_OF_RUN)),
         ("instances/groups", "SURVIVORS_PER_ROW_LOG2", int(SURVIVORS_PER_ROW.ilog2())),
@@ -241,6 +244,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "GUESS_ERRORS",
             "TEXEL_ULPS",
             "TEXEL_FLOOR",
+            "ROUNDS",
         ],
     ),
     (
