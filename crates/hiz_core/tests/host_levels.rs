@@ -90,7 +90,7 @@ impl<'a> Frame<'a> {
     }
 
     fn levels(&self, pyramid: &Pyramid) -> Vec<Vec<u32>> {
-        let stored = pyramid.stored_levels().map_or(1..=0, |stored| stored.first..=stored.last);
+        let stored = pyramid.stored_levels().into_iter().flat_map(|s| s.first..=s.last);
         let level = |k| self.engine.read_level(pyramid, k).unwrap();
         stored.map(|k| level(k).into_iter().map(f32::to_bits).collect()).collect()
     }
@@ -235,7 +235,7 @@ fn culls_keep_everything_where_the_image_came_from_another_drawing() {
 
         let (first, reduction) = (draw(&before), reduce());
         let second = draw(&nothing);
-        [first, second, reduction].map(|commands| frame.submit(commands));
+        [first, second, reduction].into_iter().for_each(|commands| frame.submit(commands));
         assert_eq!(is_kept(&frame, &pyramid), KEPT, "another drawing ran in between");
 
         let (drawing, reduction) = (draw(&before), reduce());
@@ -248,7 +248,7 @@ fn culls_keep_everything_where_the_image_came_from_another_drawing() {
 
         let (drawing, reduction) = (draw(&before), reduce());
         let added = frame.draw(&nearer, DepthLoad::Load);
-        [drawing, added, reduction].map(|commands| frame.submit(commands));
+        [drawing, added, reduction].into_iter().for_each(|commands| frame.submit(commands));
         assert_eq!(is_kept(&frame, &pyramid), KEPT, "something was added in between");
     }
 }
