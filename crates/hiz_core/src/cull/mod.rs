@@ -26,8 +26,8 @@ pub(crate) mod approximate;
 #[cfg(feature = "headless")]
 pub(crate) mod count;
 #[cfg(feature = "headless")]
-pub(crate) mod descent;
 pub(crate) mod early;
+pub(crate) mod descent;
 pub(crate) mod explain;
 pub(crate) mod full_mask;
 pub(crate) mod groups;
