@@ -25,9 +25,9 @@ pub(crate) mod among;
 pub(crate) mod approximate;
 #[cfg(feature = "headless")]
 pub(crate) mod count;
-#[cfg(feature = "headless")]
-pub(crate) mod early;
 pub(crate) mod descent;
+pub(crate) mod early;
+#[cfg(feature = "headless")]
 pub(crate) mod explain;
 pub(crate) mod full_mask;
 pub(crate) mod groups;
