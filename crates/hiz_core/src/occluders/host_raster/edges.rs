@@ -63,14 +63,14 @@ impl Edges {
 
     /// Which pixels of a tile are inside, given the functions at its first pixel.
     #[inline(always)]
-    pub(super) fn mask(&self, eight: impl Eight, at: [i32; 3]) -> Mask {
+    pub(super) fn mask(&self, eight: impl Eight, steps: &Steps, at: [i32; 3]) -> Mask {
         let mut outside = 0;
         for k in 0..3 {
             // Most edges do not cross the tile.
-            if at[k] + (STEP - 1) * (self.right[k].min(0) + self.down[k].min(0)) >= 0 {
+            if at[k] + steps.loss[k] >= 0 {
                 continue;
             }
-            let mut edge = lanes(|l| at[k] + self.right[k] * l as i32);
+            let mut edge = lanes(|l| at[k] + steps.along[k][l]);
             for row in 0..SIDE {
                 outside |= Mask::from(eight.negative(&edge)) << (SIDE * row);
                 edge = lanes(|l| edge[l] + self.down[k]);
@@ -103,6 +103,8 @@ pub(super) struct Steps {
     /// What the edges' functions gain and lose at most within a tile.
     pub(super) gain: [i32; 3],
     pub(super) loss: [i32; 3],
+    /// What they gain along the columns.
+    along: [[i32; LANES]; 3],
     /// The nearness at a tile's farthest and at its nearest corner, less that at its first pixel:
     /// along the row, and down the column.
     pub(super) low: [f32; 2],
@@ -120,6 +122,7 @@ impl Steps {
         Self {
             gain: three(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
             loss: three(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
+            along: three(|k| lanes(|l| edges.right[k] * l as i32)),
             low: [low(0), low(1)],
             high: [high(0), high(1)],
         }

@@ -4,7 +4,7 @@
 //! How a pixel's depth is computed depends on the triangle and on the image alone, so the number of
 //! panes changes no pixel.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::RangeInclusive;
 
 use crate::host::vectors::{Eight, with_eight};
 use crate::occluders::host_raster::edges::{
@@ -46,6 +46,8 @@ pub(super) struct Pane {
     tiles: Vec<Tiles>,
     /// By tile: pixels were written since `farthest` was computed.
     is_stale: Vec<bool>,
+    /// By tile: a pixel of it that was the farthest one.
+    witnesses: Vec<u8>,
     /// The tiles that are stale, and some that no longer are.
     stale: Vec<u32>,
     /// By cell of 8x8 tiles: no pixel is farther than this.
@@ -81,6 +83,7 @@ impl Pane {
             stride,
             tiles: vec![Tiles::default(); count / LANES],
             is_stale: vec![false; count],
+            witnesses: vec![0; count],
             stale: Vec::new(),
             cells: vec![0.0; cells],
             is_cell_stale: vec![false; cells],
@@ -106,6 +109,7 @@ impl Pane {
         let floats = size_of_val(&self.cells[..]) + size_of_val(&self.pixels[..]);
         let tiles = size_of_val(&self.tiles[..])
             + size_of_val(&self.is_stale[..])
+            + size_of_val(&self.witnesses[..])
             + size_of_val(&self.is_cell_stale[..])
             + size_of_val(&self.slots[..]);
         let lists = size_of_val(&self.stale[..])
@@ -251,8 +255,7 @@ impl Pane {
     /// The pixels of the tile in this column and row of the pane's.
     #[inline(always)]
     fn pixels_of(&mut self, (column, row): (usize, usize)) -> Pixels<'_> {
-        let first = row * SIDE * self.stride + column * SIDE;
-        Pixels { from_first: &mut self.pixels[first..], stride: self.stride }
+        Pixels::new(&mut self.pixels, self.stride, (column, row))
     }
 
     /// The layers of a tile, if its state says that it has some.
@@ -376,14 +379,16 @@ impl Pane {
         if is_large && self.hides_all(t.nearest, (begin, end), rows) {
             return;
         }
-        let steps = Steps::new(t, edges, self.image.fault);
         self.rises.push(Rise { slope: t.slope, nearest: t.nearest });
-        with_eight!(eight => if end - begin < NARROW {
-            for row in first..=last {
-                self.draw_narrow(eight, t, edges, &steps, row, rows, (begin, end), is_large);
+        with_eight!(eight => {
+            let steps = Steps::new(t, edges, self.image.fault);
+            if end - begin < NARROW {
+                for row in first..=last {
+                    self.draw_narrow(eight, t, edges, &steps, row, (begin, end), is_large);
+                }
+            } else {
+                self.draw_wide(eight, t, edges, &steps, (begin, end), (first, last));
             }
-        } else {
-            self.draw_wide(eight, t, edges, &steps, (begin, end), (first, last));
         });
     }
 
@@ -431,7 +436,7 @@ impl Pane {
                 let at = three(|k| {
                     at_row[k] + i64::from(column - begin) * i64::from(STEP * edges.right[k])
                 });
-                self.draw_segment(eight, t, edges, &segment, place, at, (open, covered));
+                self.draw_segment(eight, t, edges, steps, &segment, place, at, (open, covered));
             }
         }
     }
@@ -463,14 +468,11 @@ impl Pane {
         edges: &Edges,
         steps: &Steps,
         row: i32,
-        rows: (i32, i32),
         (begin, end): (i32, i32),
         is_large: bool,
     ) {
         let mut at = edges.at(t, begin * STEP, row * STEP);
         let below = t.slope[1] * to_pixels(row * STEP * UNITS + HALF - t.y[0]);
-        let rows = ((rows.0 - row * STEP).max(0), (rows.1 - row * STEP).min(STEP - 1));
-        let rows = rows.0 as usize..rows.1 as usize + 1;
         let own_row = (row - self.top / STEP) as usize;
         for column in begin..=end {
             let here = at;
@@ -493,17 +495,7 @@ impl Pane {
             let here = three(|k| here[k].clamp(-LARGE, LARGE) as i32);
             let plane = Plane { nearness, slope: t.slope, nearest: t.nearest };
             let place = (own_column, own_row);
-            self.draw_tile(
-                eight,
-                place,
-                edges,
-                here,
-                plane,
-                (low, high),
-                is_full,
-                is_large,
-                rows.clone(),
-            );
+            self.draw_tile(eight, place, edges, steps, here, plane, (low, high), is_full, is_large);
             let cell = own_row / LANES * (self.across / LANES);
             self.is_cell_stale[cell + own_column / LANES] = true;
         }
@@ -520,6 +512,7 @@ impl Pane {
         eight: impl Eight,
         t: &Triangle,
         edges: &Edges,
+        steps: &Steps,
         segment: &Segment,
         place: (usize, usize),
         at: [i64; 3],
@@ -539,12 +532,12 @@ impl Pane {
                 eight,
                 (place.0 + l, place.1),
                 edges,
+                steps,
                 at,
                 plane,
                 range,
                 is_full,
                 true,
-                0..SIDE,
             );
         }
     }
@@ -560,12 +553,12 @@ impl Pane {
         eight: impl Eight,
         place: (usize, usize),
         edges: &Edges,
+        steps: &Steps,
         at: [i32; 3],
         plane: Plane,
         (low, high): (f32, f32),
         is_full: bool,
         is_large: bool,
-        rows: Range<usize>,
     ) {
         let index = place.1 * self.across + place.0;
         let l = index % LANES;
@@ -584,13 +577,13 @@ impl Pane {
             self.tiles[index / LANES].put(l, &plane, (low, high), state);
             return;
         }
+        let mask = if is_full { Mask::MAX } else { edges.mask(eight, steps, at) };
+        let shifted = if is_planted!(self.image.fault, MasksShifted) { SIDE } else { 0 };
+        let mask = mask << shifted;
+        if mask == 0 {
+            return;
+        }
         if self.state(index) != PIXELS && (is_large || is_full) {
-            let mask = if is_full { Mask::MAX } else { edges.mask(eight, at) };
-            let shifted = if is_planted!(self.image.fault, MasksShifted) { SIDE } else { 0 };
-            let mask = mask << shifted;
-            if mask == 0 {
-                return;
-            }
             self.settle(index);
             if self.tile(index).add_layer(mask, plane, (low, high)) {
                 return;
@@ -599,22 +592,12 @@ impl Pane {
         if self.state(index) != PIXELS {
             self.expand(place);
         }
-        let nearest = &mut self.tiles[index / LANES].nearest[l];
-        *nearest = greatest(*nearest, high);
+        let tiles = &mut self.tiles[index / LANES];
+        tiles.nearest[l] = greatest(tiles.nearest[l], high);
         self.is_stale[index] = false;
-        let mut pixels = self.pixels_of(place);
-        let farthest = if is_full {
-            pixels.draw(&plane, 0..SIDE, |_| [u32::MAX; SIDE])
-        } else {
-            let skipped = rows.start as i32;
-            let mut at_row = edges.columns(three(|k| at[k] + skipped * edges.down[k]));
-            pixels.draw(&plane, rows, |_| {
-                let inside = inside(&at_row);
-                edges.step_down(&mut at_row);
-                inside
-            })
-        };
-        self.tiles[index / LANES].farthest[l] = farthest;
+        let mut pixels = Pixels::new(&mut self.pixels, self.stride, place);
+        pixels.draw(&plane, mask);
+        tiles.farthest[l] = pixels.farthest(tiles.farthest[l], &mut self.witnesses[index]);
     }
 
     /// Computes the farthest depths again of the tiles whose pixels were written.
@@ -626,8 +609,9 @@ impl Pane {
                 let (row, column) = (index / self.across, index % self.across);
                 let cell = row / LANES * (self.across / LANES) + column / LANES;
                 self.is_cell_stale[cell] = true;
-                let farthest = self.pixels_of((column, row)).farthest();
                 let (tiles, l) = (&mut self.tiles[index / LANES], index % LANES);
+                let mut pixels = Pixels::new(&mut self.pixels, self.stride, (column, row));
+                let farthest = pixels.farthest(tiles.farthest[l], &mut self.witnesses[index]);
                 let is_wrong = is_planted!(self.image.fault, RenewedTooNear);
                 tiles.farthest[l] = if is_wrong { tiles.nearest[l] } else { farthest };
             }

@@ -10,8 +10,6 @@
 //! Every way gives the same numbers: a pixel holds the greatest nearness of the planes that cover
 //! its centre.
 
-use std::ops::Range;
-
 use crate::host::vectors::{Eight, with_eight};
 use crate::occluders::host_raster::lanes::{greatest, lanes, least, least_of};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
@@ -149,8 +147,8 @@ pub(super) struct Tile<'a> {
 /// The pixels of a tile.
 pub(super) struct Pixels<'a> {
     /// The pane's pixels from the tile's first one on, and how many there are in a row.
-    pub(super) from_first: &'a mut [f32],
-    pub(super) stride: usize,
+    from_first: &'a mut [f32],
+    stride: usize,
 }
 
 /// One row of a mask: all bits of a lane for a pixel that is covered.
@@ -226,7 +224,13 @@ impl Tile<'_> {
     }
 }
 
-impl Pixels<'_> {
+impl<'a> Pixels<'a> {
+    /// Those of the tile in this column and row of a pane's `pixels`.
+    #[inline(always)]
+    pub(super) fn new(pixels: &'a mut [f32], stride: usize, (column, row): (usize, usize)) -> Self {
+        Self { from_first: &mut pixels[row * SIDE * stride + column * SIDE..], stride }
+    }
+
     #[inline(always)]
     fn row(&mut self, row: usize) -> &mut [f32; SIDE] {
         let first = row * self.stride;
@@ -245,43 +249,46 @@ impl Pixels<'_> {
         }
     }
 
-    /// Draws a plane into those that `covered` names, row by row of `rows`; returns the farthest of
-    /// all.
+    /// Draws a plane into those that `mask` names, which must be some.
     #[inline(always)]
-    pub(super) fn draw(
-        &mut self,
-        plane: &Plane,
-        rows: Range<usize>,
-        mut covered: impl FnMut(usize) -> [u32; SIDE],
-    ) -> f32 {
-        let mut farthest = [f32::MAX; SIDE];
-        for row in (0..rows.start).chain(rows.end..SIDE) {
-            let pixels = self.row(row);
-            farthest = lanes(|l| least(pixels[l], farthest[l]));
-        }
-        for row in rows {
-            let (covered, nearness) = (covered(row), plane.row(row));
+    pub(super) fn draw(&mut self, plane: &Plane, mask: Mask) {
+        let first = mask.trailing_zeros() as usize / SIDE;
+        let last = (Mask::BITS - 1 - mask.leading_zeros()) as usize / SIDE;
+        for row in first..=last {
+            let (covered, nearness) = (mask_row(mask, row), plane.row(row));
             let pixels = self.row(row);
             for l in 0..SIDE {
                 let drawn = f32::from_bits(nearness[l].to_bits() & covered[l]);
                 pixels[l] = greatest(drawn, pixels[l]);
-                farthest[l] = least(pixels[l], farthest[l]);
             }
         }
-        least_of(&farthest)
     }
 
-    /// The farthest of them.
+    /// The farthest of them, if they were no farther than `before`.
+    ///
+    /// `witness` is a guess which one that is: while it is as far as before, none else is asked.
+    #[inline(always)]
+    pub(super) fn farthest(&mut self, before: f32, witness: &mut u8) -> f32 {
+        let (row, column) = (usize::from(*witness) / SIDE % SIDE, usize::from(*witness) % SIDE);
+        if self.row(row)[column] <= before {
+            return before;
+        }
+        self.farthest_of_all(witness)
+    }
+
+    /// The farthest of them, and which one it is.
     #[inline(never)]
-    pub(super) fn farthest(&mut self) -> f32 {
+    fn farthest_of_all(&mut self, witness: &mut u8) -> f32 {
         let mut farthest = [f32::MAX; SIDE];
         for row in 0..SIDE {
             let pixels = self.row(row);
-            for l in 0..SIDE {
-                farthest[l] = least(pixels[l], farthest[l]);
-            }
+            farthest = lanes(|l| least(pixels[l], farthest[l]));
         }
-        least_of(&farthest)
+        let farthest_of_all = least_of(&farthest);
+        let column = (0..SIDE - 1).find(|l| farthest[*l] <= farthest_of_all).unwrap_or(SIDE - 1);
+        let row = (0..SIDE - 1).find(|row| self.row(*row)[column] <= farthest_of_all);
+        *witness = (row.unwrap_or(SIDE - 1) * SIDE + column) as u8;
+        farthest_of_all
     }
 }
 
