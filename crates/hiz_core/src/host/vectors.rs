@@ -65,8 +65,9 @@ pub(crate) trait Eight: Copy {
     /// A bit for each lane where `a` is at least `b`.
     fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32;
 
-    /// A bit for each lane that is negative.
-    fn negative(self, a: &[i32; 8]) -> u32;
+    /// Eight rows of eight bits: set where one of three functions is negative, which begin with
+    /// `at`, and gain `along` along a row and `down` from row to row.
+    fn rows_with_negative(self, at: &[i32; 3], along: &[[i32; 8]; 3], down: &[i32; 3]) -> u64;
 
     /// Puts `new` into the lanes of `old` that have a bit.
     fn put<T: Pod>(self, bits: u32, new: &[T; 8], old: &mut [T; 8]);
@@ -88,8 +89,11 @@ impl Eight for Plain {
     }
 
     #[inline(always)]
-    fn negative(self, a: &[i32; 8]) -> u32 {
-        (0..8).fold(0, |bits, l| bits | (a[l] as u32 >> 31) << l)
+    fn rows_with_negative(self, at: &[i32; 3], along: &[[i32; 8]; 3], down: &[i32; 3]) -> u64 {
+        (0..64).fold(0, |bits, i| {
+            let value = |k: usize| at[k] + along[k][i % 8] + (i / 8) as i32 * down[k];
+            bits | u64::from((value(0) | value(1) | value(2)) as u32 >> 31) << i
+        })
     }
 
     #[inline(always)]
@@ -116,9 +120,17 @@ impl Eight for Avx2 {
     }
 
     #[inline(always)]
-    fn negative(self, a: &[i32; 8]) -> u32 {
+    fn rows_with_negative(self, at: &[i32; 3], along: &[[i32; 8]; 3], down: &[i32; 3]) -> u64 {
+        let first = |k: usize| self.splat_i32x8(at[k]) + self.load_array_ref_i32x8(&along[k]);
+        let down = |k: usize| self.splat_i32x8(down[k]);
+        let (mut a, mut b, mut c) = (first(0), first(1), first(2));
         let zero = self.splat_i32x8(0);
-        self.load_array_ref_i32x8(a).simd_lt(zero).to_bitmask() as u32
+        let mut bits = 0;
+        for row in 0..8 {
+            bits |= (a | b | c).simd_lt(zero).to_bitmask() << (8 * row);
+            (a, b, c) = (a + down(0), b + down(1), c + down(2));
+        }
+        bits
     }
 
     #[inline(always)]
@@ -226,12 +238,11 @@ mod tests {
     }
 
     /// What [`Eight`] finds of two rows, and what it makes of the second.
-    fn found(eight: impl Eight, a: &[f32; 8], b: &[f32; 8]) -> ([u32; 3], [u32; 8]) {
+    fn found(eight: impl Eight, a: &[f32; 8], b: &[f32; 8]) -> ([u32; 2], [u32; 8]) {
         let (greater, at_least) = (eight.greater(a, b), eight.at_least(a, b));
-        let negative = eight.negative(&bytemuck::cast(*a));
         let mut chosen = *b;
         eight.put(greater ^ (at_least << 1), a, &mut chosen);
-        ([greater, at_least, negative], chosen.map(f32::to_bits))
+        ([greater, at_least], chosen.map(f32::to_bits))
     }
 
     #[test]
@@ -239,14 +250,14 @@ mod tests {
         let numbers: Vec<f32> = numbers().iter().map(|v| *v as f32).collect();
         let (rows, _) = numbers.as_chunks::<8>();
         let special = [0.0, -0.0, f32::NAN, f32::INFINITY, -1.0, 1.0, -f32::INFINITY, 1e-40];
-        let mut bits = [0; 3];
+        let mut bits = [0; 2];
         for pair in rows.windows(2).map(|pair| [pair[0], pair[1]]).chain([[special; 2]]) {
             for shift in 0..8 {
                 let (mut a, b) = (pair[0], pair[1]);
                 a.rotate_left(shift);
                 let plain = found(Plain, &a, &b);
                 for (l, (a, b)) in a.iter().zip(&b).enumerate() {
-                    let expected = [a > b, a >= b, a.is_sign_negative()];
+                    let expected = [a > b, a >= b];
                     for (count, (bits, is_so)) in bits.iter_mut().zip(plain.0.iter().zip(expected))
                     {
                         assert_eq!(bits >> l & 1 == 1, is_so, "{a} {b}");
@@ -257,6 +268,30 @@ mod tests {
             }
         }
         assert!(bits.iter().all(|count| *count > 0), "{bits:?}");
+    }
+
+    #[test]
+    fn rows_of_three_functions_have_bits_where_one_is_negative() {
+        let numbers: Vec<i32> = numbers().iter().map(|v| v.to_bits() as i32 >> 4).collect();
+        let mut counts = [0; 2];
+        for numbers in numbers.as_chunks::<40>().0 {
+            // Mostly of the size of what they gain, so that signs change.
+            let at = [0, 1, 2].map(|k| numbers[k] + (1 << 27));
+            let along = [0, 1, 2].map(|k| std::array::from_fn(|l| numbers[8 * k + 8 + l]));
+            let down = [0, 1, 2].map(|k| numbers[k + 3] / 4);
+            let plain = Plain.rows_with_negative(&at, &along, &down);
+            for row in 0..8 {
+                for l in 0..8 {
+                    let value = |k: usize| at[k] + along[k][l] + row * down[k];
+                    let expected = (0..3).any(|k| value(k) < 0);
+                    assert_eq!(plain >> (8 * row) >> l & 1 == 1, expected, "{numbers:?}");
+                    counts[usize::from(expected)] += 1;
+                }
+            }
+            let vectors = with_eight!(eight => eight.rows_with_negative(&at, &along, &down));
+            assert_eq!(vectors, plain, "{numbers:?}");
+        }
+        assert!(counts.iter().all(|count| *count > 1000), "{counts:?}");
     }
 
     #[test]

@@ -64,19 +64,7 @@ impl Edges {
     /// Which pixels of a tile are inside, given the functions at its first pixel.
     #[inline(always)]
     pub(super) fn mask(&self, eight: impl Eight, steps: &Steps, at: [i32; 3]) -> Mask {
-        let mut outside = 0;
-        for k in 0..3 {
-            // Most edges do not cross the tile.
-            if at[k] + steps.loss[k] >= 0 {
-                continue;
-            }
-            let mut edge = lanes(|l| at[k] + steps.along[k][l]);
-            for row in 0..SIDE {
-                outside |= Mask::from(eight.negative(&edge)) << (SIDE * row);
-                edge = lanes(|l| edge[l] + self.down[k]);
-            }
-        }
-        !outside
+        !eight.rows_with_negative(&at, &steps.along, &self.down)
     }
 
     #[inline(always)]
