@@ -276,8 +276,8 @@ impl HostRaster {
             let boxes = &shapes.blocks.parts[meshlet.first_part as usize..];
             let firsts = (0..candidate.groups.1).step_by(PART_GROUPS);
             memory::reserve(&mut parts, firsts.len(), "meshlets")?;
-            with_eight!(eight => for (first, [min, max]) in firsts.zip(boxes) {
-                if let Some(extent) = extent(eight, lens, &self.image, *min, *max) {
+            with_eight!(eight => for (first, part) in firsts.zip(boxes) {
+                if let Some(extent) = extent(eight, lens, &self.image, part.min, part.max) {
                     let end = candidate.groups.1.min(first + PART_GROUPS as u32);
                     parts.push(Candidate { groups: (first, end), extent, ..candidate });
                 }
