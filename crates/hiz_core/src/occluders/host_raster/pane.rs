@@ -236,11 +236,6 @@ impl Pane {
     }
 
     #[inline(always)]
-    fn set_state(&mut self, index: usize, state: State) {
-        self.tiles[index / LANES].states[index % LANES] = state;
-    }
-
-    #[inline(always)]
     fn tile(&mut self, index: usize) -> Tile<'_> {
         let (tiles, l) = (&mut self.tiles[index / LANES], index % LANES);
         Tile {
@@ -250,12 +245,6 @@ impl Pane {
             layers: &mut self.layers[self.slots[index] as usize],
             fault: self.image.fault,
         }
-    }
-
-    /// The pixels of the tile in this column and row of the pane's.
-    #[inline(always)]
-    fn pixels_of(&mut self, (column, row): (usize, usize)) -> Pixels<'_> {
-        Pixels::new(&mut self.pixels, self.stride, (column, row))
     }
 
     /// The layers of a tile, if its state says that it has some.
@@ -276,8 +265,9 @@ impl Pane {
     fn settle(&mut self, index: usize) {
         if self.slots[index] == 0 {
             if self.used_layers == self.layers.len() {
-                self.layers.resize(2 * self.used_layers, Layers::default());
+                self.more_layers();
             }
+            self.layers[self.used_layers].clear();
             self.slots[index] = self.used_layers as u32;
             self.used_layers += 1;
         }
@@ -287,13 +277,31 @@ impl Pane {
         }
     }
 
+    #[cold]
+    #[inline(never)]
+    fn more_layers(&mut self) {
+        self.layers.resize(2 * self.used_layers, Layers::default());
+    }
+
     /// Turns whatever the tile in this column and row of the pane's is into pixels.
     #[inline(never)]
     fn expand(&mut self, (column, row): (usize, usize)) {
         let index = row * self.across + column;
-        let rows: [_; SIDE] = std::array::from_fn(|y| self.row_of_tile(column, row, y));
-        self.pixels_of((column, row)).fill(|y| rows[y]);
-        self.set_state(index, PIXELS);
+        let mut pixels = Pixels::new(&mut self.pixels, self.stride, (column, row));
+        let (tiles, l) = (&mut self.tiles[index / LANES], index % LANES);
+        match tiles.states[l] {
+            CLEAR => pixels.fill(|_| [0.0; SIDE]),
+            PIXELS => {}
+            state @ FULL.. => {
+                let plane = Plane::at(tiles.first[l], &self.rises[(state - FULL) as usize]);
+                pixels.fill(|y| plane.row(y));
+            }
+            state => {
+                let layers = &self.layers[self.slots[index] as usize];
+                pixels.fill(|y| row_of_layers(state, layers, y, self.image.fault));
+            }
+        }
+        tiles.states[l] = PIXELS;
     }
 
     /// Draws the part of a triangle that lies in this pane.
@@ -585,7 +593,7 @@ impl Pane {
         }
         if self.state(index) != PIXELS && (is_large || is_full) {
             self.settle(index);
-            if self.tile(index).add_layer(mask, plane, (low, high)) {
+            if self.tile(index).add_layer(mask, &plane, (low, high)) {
                 return;
             }
         }

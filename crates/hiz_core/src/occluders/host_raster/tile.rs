@@ -111,17 +111,67 @@ pub(super) fn order(
     }
 }
 
-/// A plane where it is the nearest.
+/// The layers of a tile, of which its state counts those in use: planes where they are the nearest.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Layer {
-    mask: Mask,
-    plane: Plane,
-    least: f32,
-    greatest: f32,
+pub(super) struct Layers {
+    /// Those of layers that are not in use are 0.
+    masks: [Mask; MOST_LAYERS],
+    least: [f32; MOST_LAYERS],
+    greatest: [f32; MOST_LAYERS],
+    planes: [Plane; MOST_LAYERS],
 }
 
-/// The layers of a tile, of which its state counts those in use.
-pub(super) type Layers = [Layer; MOST_LAYERS];
+impl Layers {
+    #[inline(always)]
+    pub(super) fn clear(&mut self) {
+        self.masks = [0; MOST_LAYERS];
+    }
+
+    #[inline(always)]
+    fn put(&mut self, k: usize, mask: Mask, plane: &Plane, (low, high): (f32, f32)) {
+        (self.masks[k], self.planes[k]) = (mask, *plane);
+        (self.least[k], self.greatest[k]) = (low, high);
+    }
+
+    /// Where a plane is nearer than all layers, of `mask`.
+    #[inline(never)]
+    fn shown(&self, mask: Mask, plane: &Plane, (low, high): (f32, f32), fault: Planted) -> Mask {
+        let mut shown = mask;
+        for k in 0..MOST_LAYERS {
+            if self.masks[k] & shown == 0 || low >= self.greatest[k] {
+                continue;
+            }
+            let hidden = if high > self.least[k] {
+                match order((plane, high), (&self.planes[k], self.greatest[k]), fault) {
+                    Some(true) => 0,
+                    Some(false) => self.masks[k],
+                    None => self.masks[k] & !nearer(plane, &self.planes[k]),
+                }
+            } else {
+                self.masks[k]
+            };
+            if !is_planted!(fault, LayersOverlap) {
+                shown &= !hidden;
+            }
+        }
+        shown
+    }
+
+    /// Moves layers that still cover something to the front; says how many they are.
+    #[inline(never)]
+    fn close_ranks(&mut self) -> usize {
+        let mut kept = 0;
+        for k in 0..MOST_LAYERS {
+            let mask = std::mem::take(&mut self.masks[k]);
+            if mask != 0 {
+                let (plane, range) = (self.planes[k], (self.least[k], self.greatest[k]));
+                self.put(kept, mask, &plane, range);
+                kept += 1;
+            }
+        }
+        kept
+    }
+}
 
 /// How the depth of a tile is kept: as so many layers, as [`PIXELS`], or as one plane ([`FULL`]).
 pub(super) type State = u32;
@@ -162,8 +212,8 @@ impl Tile<'_> {
     /// Makes the plane of a tile that is [`FULL`] its first layer.
     #[inline(always)]
     pub(super) fn settle(&mut self, plane: Plane) {
-        let (least, greatest) = (*self.farthest, *self.nearest);
-        self.layers[0] = Layer { mask: Mask::MAX, plane, least, greatest };
+        self.layers.clear();
+        self.layers.put(0, Mask::MAX, &plane, (*self.farthest, *self.nearest));
         *self.state = 1;
     }
 
@@ -173,52 +223,39 @@ impl Tile<'_> {
     pub(super) fn add_layer(
         &mut self,
         mut mask: Mask,
-        plane: Plane,
+        plane: &Plane,
         (low, high): (f32, f32),
     ) -> bool {
-        let count = (*self.state as usize).min(MOST_LAYERS);
-        for layer in &self.layers[..count] {
-            if layer.mask & mask == 0 || low >= layer.greatest {
-                continue;
-            }
-            let hidden = if high > layer.least {
-                match order((&plane, high), (&layer.plane, layer.greatest), self.fault) {
-                    Some(true) => 0,
-                    Some(false) => layer.mask,
-                    None => layer.mask & !nearer(&plane, &layer.plane),
-                }
-            } else {
-                layer.mask
-            };
-            if !is_planted!(self.fault, LayersOverlap) {
-                mask &= !hidden;
+        let Self { layers, fault, .. } = self;
+        // Most often all of it shows.
+        let is_behind = |k: usize| (layers.masks[k] & mask != 0) & (low < layers.greatest[k]);
+        if is_behind(0) | is_behind(1) | is_behind(2) | is_behind(3) {
+            mask = layers.shown(mask, plane, (low, high), *fault);
+            if mask == 0 {
+                return true;
             }
         }
-        if mask == 0 {
-            return true;
+        let mut count = *self.state as usize;
+        let before = layers.masks;
+        let covered = mask | (before[0] | before[1]) | (before[2] | before[3]);
+        let is_lost = |k: usize| (before[k] != 0) & (before[k] & !mask == 0);
+        let is_any_lost = is_lost(0) | is_lost(1) | is_lost(2) | is_lost(3);
+        for k in 0..MOST_LAYERS {
+            layers.masks[k] = before[k] & !mask;
         }
-        let (mut kept, mut covered, mut farthest) = (0, mask, low);
-        for k in 0..count {
-            let left = self.layers[k].mask & !mask;
-            if left != 0 {
-                covered |= left;
-                farthest = least(farthest, self.layers[k].least);
-                if kept < k {
-                    self.layers[kept] = self.layers[k];
-                }
-                self.layers[kept].mask = left;
-                kept += 1;
-            }
+        if is_any_lost {
+            count = layers.close_ranks();
         }
-        *self.state = kept as State;
-        if kept == MOST_LAYERS {
+        if count >= MOST_LAYERS {
+            *self.state = MOST_LAYERS as State;
             return false;
         }
-        self.layers[kept] = Layer { mask, plane, least: low, greatest: high };
-        *self.state += 1;
+        layers.put(count, mask, plane, (low, high));
+        *self.state = count as State + 1;
         *self.nearest = greatest(*self.nearest, high);
         if covered == Mask::MAX {
-            *self.farthest = greatest(*self.farthest, farthest);
+            let least_of_all = layers.least[..=count].iter().fold(low, |a, b| least(*b, a));
+            *self.farthest = greatest(*self.farthest, least_of_all);
         }
         true
     }
@@ -295,8 +332,8 @@ impl<'a> Pixels<'a> {
 /// Whether layers cover all of a tile.
 #[cfg(feature = "methods")]
 pub(super) fn is_covered(state: State, layers: &Layers) -> bool {
-    let used = &layers[..(state as usize).min(MOST_LAYERS)];
-    used.iter().fold(0, |covered, layer| covered | layer.mask) == Mask::MAX
+    let used = &layers.masks[..(state as usize).min(MOST_LAYERS)];
+    used.iter().fold(0, |covered, mask| covered | mask) == Mask::MAX
 }
 
 /// Row `row` of a tile whose depth is in layers, not in pixels.
@@ -309,17 +346,17 @@ pub(super) fn row_of_layers(
 ) -> [f32; SIDE] {
     match state as usize {
         0 => [0.0; SIDE],
-        1 if layers[0].mask == Mask::MAX => {
+        1 if layers.masks[0] == Mask::MAX => {
             // What lies beyond the far plane has no depth.
             let least = if is_planted!(fault, BeyondFar) { f32::MIN } else { 0.0 };
-            let nearness = layers[0].plane.row(row);
+            let nearness = layers.planes[0].row(row);
             lanes(|l| greatest(nearness[l], least))
         }
         count => {
             let mut out = [0.0; SIDE];
-            for layer in &layers[..count.min(MOST_LAYERS)] {
-                let covered = mask_row(layer.mask, row);
-                let nearness = layer.plane.row(row);
+            for k in 0..count.min(MOST_LAYERS) {
+                let covered = mask_row(layers.masks[k], row);
+                let nearness = layers.planes[k].row(row);
                 for l in 0..SIDE {
                     // The layers' masks have no pixel in common.
                     let drawn = f32::from_bits(nearness[l].to_bits() & covered[l]);
