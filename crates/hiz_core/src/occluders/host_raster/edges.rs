@@ -1,6 +1,6 @@
 //! What a triangle does from pixel to pixel and from tile to tile: its edges and its depth.
 
-use crate::host::vectors::Eight;
+use crate::host::vectors::{Eight, Linear};
 use crate::occluders::host_raster::lanes::{lanes, least, three};
 use crate::occluders::host_raster::lens::{HALF, UNITS};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
@@ -55,32 +55,17 @@ impl Edges {
         })
     }
 
-    /// The functions along the columns of a tile's first row, given those at its first pixel.
+    /// What the functions gain along the columns of a tile.
     #[inline(always)]
-    pub(super) fn columns(&self, at: [i32; 3]) -> [[i32; LANES]; 3] {
-        three(|k| lanes(|l| at[k] + self.right[k] * l as i32))
+    pub(super) fn along(&self) -> [[i32; LANES]; 3] {
+        three(|k| lanes(|l| self.right[k] * l as i32))
     }
 
     /// Which pixels of a tile are inside, given the functions at its first pixel.
     #[inline(always)]
     pub(super) fn mask(&self, eight: impl Eight, steps: &Steps, at: [i32; 3]) -> Mask {
-        !eight.rows_with_negative(&at, &steps.along, &self.down)
+        !eight.rows_with_negative(&Linear { at, along: &steps.along, down: &self.down })
     }
-
-    #[inline(always)]
-    pub(super) fn step_down(&self, edges: &mut [[i32; LANES]; 3]) {
-        for k in 0..3 {
-            for l in 0..LANES {
-                edges[k][l] += self.down[k];
-            }
-        }
-    }
-}
-
-/// For each column: all bits set if the pixel is inside of three edges.
-#[inline(always)]
-pub(super) fn inside(edges: &[[i32; LANES]; 3]) -> [u32; LANES] {
-    lanes(|l| !((edges[0][l] | edges[1][l] | edges[2][l]) >> 31) as u32)
 }
 
 /// Beyond this size the sign of an edge's function is the same over a tile.
@@ -110,7 +95,7 @@ impl Steps {
         Self {
             gain: three(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
             loss: three(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
-            along: three(|k| lanes(|l| edges.right[k] * l as i32)),
+            along: edges.along(),
             low: [low(0), low(1)],
             high: [high(0), high(1)],
         }

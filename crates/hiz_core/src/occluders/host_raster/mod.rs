@@ -204,7 +204,7 @@ impl HostRaster {
             self.panes.cut(image, grid_for(&image, planned));
         }
         on_threads(threads, self.panes.by_work(&candidates), |pane| {
-            let mut vertices = Vertices::new();
+            let (mut vertices, mut triangles) = (Vertices::new(), Vec::new());
             for (candidate, drawn) in candidates.iter().zip(&drawn) {
                 let Candidate { extent, .. } = candidate;
                 if !pane.meets(extent) {
@@ -215,7 +215,16 @@ impl HostRaster {
                 }
                 drawn.store(true, Ordering::Relaxed);
                 let lens = &lenses[candidate.lens as usize];
-                draw_meshlet(scene.shapes, candidate, lens, faces, &image, pane, &mut vertices);
+                draw_meshlet(
+                    scene.shapes,
+                    candidate,
+                    lens,
+                    faces,
+                    &image,
+                    pane,
+                    &mut vertices,
+                    &mut triangles,
+                );
                 pane.renew();
             }
         });
@@ -375,6 +384,7 @@ const SPLIT_FROM: i64 = 32;
 /// Triangles of a meshlet are sorted if so many pixels of its box come to each of them.
 const SORTED_FROM: i64 = 1024;
 
+#[expect(clippy::too_many_arguments, reason = "what one loop over triangles needs")]
 fn draw_meshlet(
     shapes: &Shapes,
     candidate: &Candidate,
@@ -383,9 +393,12 @@ fn draw_meshlet(
     image: &Image,
     pane: &mut Pane,
     vertices: &mut Vertices,
+    triangles: &mut Vec<Triangle>,
 ) {
     let pixels = pane.pixels();
-    triangles_of(shapes, candidate, lens, faces, image, pixels, vertices, |t| pane.draw(t));
+    triangles.clear();
+    triangles_of(shapes, candidate, lens, faces, image, pixels, vertices, |t| triangles.push(*t));
+    pane.draw(triangles);
 }
 
 /// Hands out the triangles of a meshlet that may cover a centre in these columns and rows.

@@ -6,9 +6,9 @@
 
 use std::ops::RangeInclusive;
 
-use crate::host::vectors::{Eight, with_eight};
+use crate::host::vectors::{Eight, Linear, Rows, with_eight};
 use crate::occluders::host_raster::edges::{
-    Edges, LARGE, STEP, Segment, Spans, Steps, bits, inside, to_pixels,
+    Edges, LARGE, STEP, Segment, Spans, Steps, bits, to_pixels,
 };
 use crate::occluders::host_raster::lanes::{greatest, lanes, least, three};
 use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS};
@@ -304,11 +304,19 @@ impl Pane {
         tiles.states[l] = PIXELS;
     }
 
+    /// Draws the parts of triangles that lie in this pane.
+    #[inline(never)]
+    pub(super) fn draw(&mut self, triangles: &[Triangle]) {
+        with_eight!(eight => for t in triangles {
+            self.draw_triangle(eight, t);
+        });
+    }
+
     /// Draws the part of a triangle that lies in this pane.
     ///
     /// In which way is chosen by its part in the image, because their roundings differ.
-    #[inline(never)]
-    pub(super) fn draw(&mut self, t: &Triangle) {
+    #[inline(always)]
+    fn draw_triangle(&mut self, eight: impl Eight, t: &Triangle) {
         let bounds = |v: &[i32; 3]| (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
         let (left, right) = bounds(&t.x);
         let (up, down) = bounds(&t.y);
@@ -325,22 +333,35 @@ impl Pane {
         }
         let edges = Edges::new(t, self.image.fault);
         if is_narrow && right - left <= SMALL && down - up <= SMALL {
-            self.draw_by_rows(t, &edges, columns, rows);
+            self.draw_by_rows(eight, t, &edges, columns, rows);
         } else {
-            self.draw_by_tiles(t, &edges, columns, rows);
+            self.draw_by_tiles(eight, t, &edges, columns, rows);
         }
     }
 
     /// Draws a triangle of at most [`LANES`] columns, one segment for each row.
-    fn draw_by_rows(&mut self, t: &Triangle, edges: &Edges, columns: (i32, i32), rows: (i32, i32)) {
+    #[inline(always)]
+    fn draw_by_rows(
+        &mut self,
+        eight: impl Eight,
+        t: &Triangle,
+        edges: &Edges,
+        columns: (i32, i32),
+        rows: (i32, i32),
+    ) {
         let tile_row = |row: i32| (row - self.top) as usize / SIDE;
         let tile_column = |column: i32| (column - self.left) as usize / SIDE;
         let (begin, end) = (tile_column(columns.0), tile_column(columns.1));
+        let mut is_hidden = true;
         for row in tile_row(rows.0)..=tile_row(rows.1) {
             for column in begin..=end {
                 let tile = row * self.across + column;
-                let nearest = &mut self.tiles[tile / LANES].nearest[tile % LANES];
-                *nearest = greatest(*nearest, t.nearest);
+                let (tiles, l) = (&mut self.tiles[tile / LANES], tile % LANES);
+                if tiles.farthest[l] >= t.nearest {
+                    continue;
+                }
+                is_hidden = false;
+                tiles.nearest[l] = greatest(tiles.nearest[l], t.nearest);
                 if !self.is_stale[tile] {
                     self.is_stale[tile] = true;
                     self.stale.push(tile as u32);
@@ -350,31 +371,39 @@ impl Pane {
                 }
             }
         }
-        let mut at_row = edges.columns(edges.at_small(t, columns.0, rows.0));
+        if is_hidden {
+            return;
+        }
+        // Pixels of tiles that hide it stay as they are, and those of tiles that have none are not
+        // looked at before they are written again.
+        let at = edges.at_small(t, columns.0, rows.0);
         let x = to_pixels(columns.0 * UNITS + HALF - t.x[0]);
         let y = to_pixels(rows.0 * UNITS + HALF - t.y[0]);
         // `x + l` is exact, so the first column changes nothing.
         let along = lanes(|l| t.nearness + t.slope[0] * (x + l as f32));
-        let own_column = (columns.0 - self.left) as usize;
-        let mut at = (rows.0 - self.top) as usize * self.stride + own_column;
-        for row in 0..=rows.1 - rows.0 {
-            let below = t.slope[1] * (y + row as f32);
-            let Ok(pixels) = <&mut [f32; LANES]>::try_from(&mut self.pixels[at..at + LANES]) else {
-                unreachable!("a slice of this length")
-            };
-            let inside = inside(&at_row);
-            for l in 0..LANES {
-                let nearness = least(along[l] + below, t.nearest);
-                pixels[l] = greatest(f32::from_bits(nearness.to_bits() & inside[l]), pixels[l]);
-            }
-            edges.step_down(&mut at_row);
-            at += self.stride;
-        }
+        let first = (rows.0 - self.top) as usize * self.stride + (columns.0 - self.left) as usize;
+        let pixels = Rows {
+            numbers: &mut self.pixels[first..],
+            stride: self.stride,
+            columns: (columns.1 - columns.0) as usize + 1,
+            rows: (rows.1 - rows.0) as usize + 1,
+        };
+        let linear = Linear { at, along: &edges.along(), down: &edges.down };
+        eight.raise(
+            pixels,
+            &linear,
+            &along,
+            #[inline(always)]
+            |row| t.slope[1] * (y + row as f32),
+            t.nearest,
+        );
     }
 
     /// Draws a triangle tile by tile.
+    #[inline(always)]
     fn draw_by_tiles(
         &mut self,
+        eight: impl Eight,
         t: &Triangle,
         edges: &Edges,
         columns: (i32, i32),
@@ -388,16 +417,14 @@ impl Pane {
             return;
         }
         self.rises.push(Rise { slope: t.slope, nearest: t.nearest });
-        with_eight!(eight => {
-            let steps = Steps::new(t, edges, self.image.fault);
-            if end - begin < NARROW {
-                for row in first..=last {
-                    self.draw_narrow(eight, t, edges, &steps, row, (begin, end), is_large);
-                }
-            } else {
-                self.draw_wide(eight, t, edges, &steps, (begin, end), (first, last));
+        let steps = Steps::new(t, edges, self.image.fault);
+        if end - begin < NARROW {
+            for row in first..=last {
+                self.draw_narrow(eight, t, edges, &steps, row, (begin, end), is_large);
             }
-        });
+        } else {
+            self.draw_wide(eight, t, edges, &steps, (begin, end), (first, last));
+        }
     }
 
     /// Draws a triangle into the tiles `begin..=end` of the rows `first..=last`, [`LANES`] at once.
