@@ -96,6 +96,9 @@ pub(crate) trait Eight: Copy {
     /// A bit for each lane where `a` is at least `b`.
     fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32;
 
+    /// A bit for each lane where one of three numbers is negative with what is added to it.
+    fn any_negative(self, numbers: &[[i32; 8]; 3], added: &[i32; 3]) -> u32;
+
     /// Eight rows of eight bits: set where a function is negative.
     fn rows_with_negative(self, linear: &Linear<'_>) -> u64;
 
@@ -127,6 +130,14 @@ impl Eight for Plain {
     #[inline(always)]
     fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
         (0..8).fold(0, |bits, l| bits | u32::from(a[l] >= b[l]) << l)
+    }
+
+    #[inline(always)]
+    fn any_negative(self, numbers: &[[i32; 8]; 3], added: &[i32; 3]) -> u32 {
+        (0..8).fold(0, |bits, l| {
+            let number = |k: usize| numbers[k][l] + added[k];
+            bits | ((number(0) | number(1) | number(2)) as u32 >> 31) << l
+        })
     }
 
     #[inline(always)]
@@ -192,6 +203,13 @@ impl Eight for Avx2 {
     fn at_least(self, a: &[f32; 8], b: &[f32; 8]) -> u32 {
         let [a, b] = [a, b].map(|v| self.load_array_ref_f32x8(v));
         a.simd_ge(b).to_bitmask() as u32
+    }
+
+    #[inline(always)]
+    fn any_negative(self, numbers: &[[i32; 8]; 3], added: &[i32; 3]) -> u32 {
+        let number = |k: usize| self.load_array_ref_i32x8(&numbers[k]) + self.splat_i32x8(added[k]);
+        let any = number(0) | number(1) | number(2);
+        any.simd_lt(self.splat_i32x8(0)).to_bitmask() as u32
     }
 
     #[inline(always)]

@@ -68,7 +68,8 @@ impl Edges {
     }
 }
 
-/// Beyond this size the sign of an edge's function is the same over a tile.
+/// Beyond this size the sign of an edge's function is the same over [`LANES`] tiles in a row: from
+/// pixel to pixel it grows by 2^23 at most.
 pub(super) const LARGE: i64 = 1 << 30;
 
 /// What a triangle's functions do within a tile.
@@ -76,8 +77,9 @@ pub(super) struct Steps {
     /// What the edges' functions gain and lose at most within a tile.
     pub(super) gain: [i32; 3],
     pub(super) loss: [i32; 3],
-    /// What they gain along the columns.
+    /// What they gain along the columns of a tile, and from tile to tile along a row.
     along: [[i32; LANES]; 3],
+    along_tiles: [[i32; LANES]; 3],
     /// The nearness at a tile's farthest and at its nearest corner, less that at its first pixel:
     /// along the row, and down the column.
     pub(super) low: [f32; 2],
@@ -96,9 +98,24 @@ impl Steps {
             gain: three(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
             loss: three(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
             along: edges.along(),
+            along_tiles: three(|k| lanes(|l| edges.right[k] * (STEP * l as i32))),
             low: [low(0), low(1)],
             high: [high(0), high(1)],
         }
+    }
+}
+
+impl Steps {
+    /// The edges' functions at the first pixels of [`LANES`] tiles in a row, given those of the
+    /// first one.
+    ///
+    /// Where they are [`LARGE`] their signs are right.
+    #[inline(always)]
+    pub(super) fn along_tiles(&self, at: &[i64; 3]) -> [[i32; LANES]; 3] {
+        three(|k| {
+            let first = at[k].clamp(-LARGE, LARGE) as i32;
+            lanes(|l| first + self.along_tiles[k][l])
+        })
     }
 }
 

@@ -7,9 +7,7 @@
 use std::ops::RangeInclusive;
 
 use crate::host::vectors::{Eight, Linear, Rows, with_eight};
-use crate::occluders::host_raster::edges::{
-    Edges, LARGE, STEP, Segment, Spans, Steps, bits, to_pixels,
-};
+use crate::occluders::host_raster::edges::{Edges, STEP, Segment, Spans, Steps, bits, to_pixels};
 use crate::occluders::host_raster::lanes::{greatest, lanes, least, three};
 use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS};
 use crate::occluders::host_raster::planted_fault::is_planted;
@@ -427,7 +425,8 @@ impl Pane {
         }
     }
 
-    /// Draws a triangle into the tiles `begin..=end` of the rows `first..=last`, [`LANES`] at once.
+    /// Draws a triangle into the tiles `begin..=end` of the rows `first..=last`, which are many in a
+    /// row.
     #[inline(always)]
     fn draw_wide(
         &mut self,
@@ -439,39 +438,27 @@ impl Pane {
         (first, last): (i32, i32),
     ) {
         const MANY: i32 = LANES as i32;
-        let mut at = edges.at(t, begin * STEP, first * STEP);
-        let mut spans = Spans::new(&at, edges, steps, (begin, end), self.image.fault);
+        let mut at_begin = edges.at(t, begin * STEP, first * STEP);
+        let mut spans = Spans::new(&at_begin, edges, steps, (begin, end), self.image.fault);
         for row in first..=last {
             let [met, covered] = spans.row();
-            let at_row = at;
+            let at_row = at_begin;
             for k in 0..3 {
-                at[k] += i64::from(STEP * edges.down[k]);
+                at_begin[k] += i64::from(STEP * edges.down[k]);
             }
             spans.step_down();
             if met.0 >= met.1 {
                 continue;
             }
-            let y = to_pixels(row * STEP * UNITS + HALF - t.y[0]);
-            let own_row = (row - self.top / STEP) as usize;
             for group in met.0 / MANY..=(met.1 - 1) / MANY {
                 let column = group * MANY;
-                let own_group = (group - self.left / ACROSS as i32) as usize;
-                let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
-                let segment = Segment::new(t, steps, (x, y));
-                let tiles = own_row * (self.across / LANES) + own_group;
-                let state = FULL + self.rises.len() as State - 1;
-                let (met, covered) = (bits(met, column), bits(covered, column));
-                let Some(open) = self.tiles[tiles].replace(eight, &segment, met, covered, state)
-                else {
-                    continue;
+                let at = || {
+                    steps.along_tiles(&three(|k| {
+                        at_row[k] + i64::from(column - begin) * i64::from(STEP * edges.right[k])
+                    }))
                 };
-                let cell = own_row / LANES * (self.across / LANES) + own_group;
-                self.is_cell_stale[cell] = true;
-                let place = (own_group * LANES, own_row);
-                let at = three(|k| {
-                    at_row[k] + i64::from(column - begin) * i64::from(STEP * edges.right[k])
-                });
-                self.draw_segment(eight, t, edges, steps, &segment, place, at, (open, covered));
+                let which = (bits(met, column), bits(covered, column));
+                self.draw_group(eight, t, edges, steps, (column, row), at, which, true);
             }
         }
     }
@@ -493,7 +480,7 @@ impl Pane {
         true
     }
 
-    /// Draws a triangle into the tiles `begin..=end` of a row, one by one.
+    /// Draws a triangle into the tiles `begin..=end` of a row, which are few.
     #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
     #[inline(always)]
     fn draw_narrow(
@@ -506,74 +493,62 @@ impl Pane {
         (begin, end): (i32, i32),
         is_large: bool,
     ) {
-        let mut at = edges.at(t, begin * STEP, row * STEP);
-        let below = t.slope[1] * to_pixels(row * STEP * UNITS + HALF - t.y[0]);
-        let own_row = (row - self.top / STEP) as usize;
-        for column in begin..=end {
-            let here = at;
-            for k in 0..3 {
-                at[k] += i64::from(STEP * edges.right[k]);
+        const MANY: i32 = LANES as i32;
+        for group in begin / MANY..=end / MANY {
+            let column = group * MANY;
+            let at = steps.along_tiles(&edges.at(t, column * STEP, row * STEP));
+            let met = bits((begin, end + 1), column) & !eight.any_negative(&at, &steps.gain);
+            if met != 0 {
+                let covered = met & !eight.any_negative(&at, &steps.loss);
+                let which = (met, covered);
+                self.draw_group(eight, t, edges, steps, (column, row), || at, which, is_large);
             }
-            if (0..3).any(|k| here[k] + i64::from(steps.gain[k]) < 0) {
-                continue;
-            }
-            let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
-            let nearness = (t.nearness + t.slope[0] * x) + below;
-            let own_column = (column - self.left / STEP) as usize;
-            let index = own_row * self.across + own_column;
-            let high = least(steps.high[0] + (nearness + steps.high[1]), t.nearest);
-            if high <= self.farthest(index) {
-                continue;
-            }
-            let low = least(steps.low[0] + (nearness + steps.low[1]), t.nearest);
-            let is_full = (0..3).all(|k| here[k] + i64::from(steps.loss[k]) >= 0);
-            let here = three(|k| here[k].clamp(-LARGE, LARGE) as i32);
-            let plane = Plane { nearness, slope: t.slope, nearest: t.nearest };
-            let place = (own_column, own_row);
-            self.draw_tile(eight, place, edges, steps, here, plane, (low, high), is_full, is_large);
-            let cell = own_row / LANES * (self.across / LANES);
-            self.is_cell_stale[cell + own_column / LANES] = true;
         }
     }
 
-    /// Draws a triangle into the tiles of a segment that are `open`.
+    /// Draws a triangle into [`LANES`] tiles in a row, of which the first one is in this column and
+    /// row of the image's tiles.
     ///
-    /// `place` and `at` are those of the segment's first tile, see [`Self::draw_tile`]; `covered`
-    /// are those that the triangle covers.
+    /// `at` are the edges' functions at their first pixels, and bits say which tiles the triangle
+    /// meets and which it covers.
     #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
     #[inline(always)]
-    fn draw_segment(
+    fn draw_group(
         &mut self,
         eight: impl Eight,
         t: &Triangle,
         edges: &Edges,
         steps: &Steps,
-        segment: &Segment,
-        place: (usize, usize),
-        at: [i64; 3],
-        (mut open, covered): (u32, u32),
+        (column, row): (i32, i32),
+        at: impl FnOnce() -> [[i32; LANES]; 3],
+        (met, covered): (u32, u32),
+        is_large: bool,
     ) {
+        let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
+        let y = to_pixels(row * STEP * UNITS + HALF - t.y[0]);
+        let segment = Segment::new(t, steps, (x, y));
+        let own_row = (row - self.top / STEP) as usize;
+        let own_group = (column * STEP - self.left) as usize / ACROSS;
+        let tiles = own_row * (self.across / LANES) + own_group;
+        let state = FULL + self.rises.len() as State - 1;
+        let Some(mut open) = self.tiles[tiles].replace(eight, &segment, met, covered, state) else {
+            return;
+        };
+        let cell = own_row / LANES * (self.across / LANES) + own_group;
+        self.is_cell_stale[cell] = true;
+        if open == 0 {
+            return;
+        }
+        let at = at();
         while open != 0 {
             let l = open.trailing_zeros() as usize % LANES;
             open &= open - 1;
             let plane = Plane { nearness: segment.nearness[l], slope: t.slope, nearest: t.nearest };
             let range = (segment.low[l], segment.high[l]);
             let is_full = covered >> l & 1 == 1;
-            let at = three(|k| {
-                let at = at[k] + l as i64 * i64::from(STEP * edges.right[k]);
-                at.clamp(-LARGE, LARGE) as i32
-            });
-            self.draw_tile(
-                eight,
-                (place.0 + l, place.1),
-                edges,
-                steps,
-                at,
-                plane,
-                range,
-                is_full,
-                true,
-            );
+            let place = (own_group * LANES + l, own_row);
+            let at = three(|k| at[k][l]);
+            self.draw_tile(eight, place, edges, steps, at, plane, range, is_full, is_large);
         }
     }
 
