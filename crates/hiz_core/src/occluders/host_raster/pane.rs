@@ -595,7 +595,12 @@ impl Pane {
         }
         if self.state(index) != PIXELS && (is_large || is_full) {
             self.settle(index);
-            if self.tile(index).add_layer(mask, &plane, (low, high)) {
+            let mut tile = self.tile(index);
+            if *tile.state == CLEAR {
+                tile.first_layer(mask, &plane, (low, high));
+                return;
+            }
+            if tile.add_layer(mask, &plane, (low, high)) {
                 return;
             }
         }

@@ -116,6 +116,7 @@ pub(super) fn order(
 pub(super) struct Layers {
     /// Those of layers that are not in use are 0.
     masks: [Mask; MOST_LAYERS],
+    /// Those of layers that are not in use are infinite.
     least: [f32; MOST_LAYERS],
     greatest: [f32; MOST_LAYERS],
     planes: [Plane; MOST_LAYERS],
@@ -125,6 +126,7 @@ impl Layers {
     #[inline(always)]
     pub(super) fn clear(&mut self) {
         self.masks = [0; MOST_LAYERS];
+        self.least = [f32::INFINITY; MOST_LAYERS];
     }
 
     #[inline(always)]
@@ -163,8 +165,9 @@ impl Layers {
         let mut kept = 0;
         for k in 0..MOST_LAYERS {
             let mask = std::mem::take(&mut self.masks[k]);
+            let low = std::mem::replace(&mut self.least[k], f32::INFINITY);
             if mask != 0 {
-                let (plane, range) = (self.planes[k], (self.least[k], self.greatest[k]));
+                let (plane, range) = (self.planes[k], (low, self.greatest[k]));
                 self.put(kept, mask, &plane, range);
                 kept += 1;
             }
@@ -217,10 +220,54 @@ impl Tile<'_> {
         *self.state = 1;
     }
 
+    /// Draws a plane where `mask` is set, as the only layer.
+    #[inline(always)]
+    pub(super) fn first_layer(&mut self, mask: Mask, plane: &Plane, range: (f32, f32)) {
+        self.layers.clear();
+        self.layers.put(0, mask, plane, range);
+        *self.state = 1;
+        *self.nearest = range.1;
+    }
+
     /// Draws a plane where `mask` is set, as one more layer; false if that would need pixels.
     ///
     /// The tile must have layers.
-    pub(super) fn add_layer(
+    #[inline(always)]
+    pub(super) fn add_layer(&mut self, mask: Mask, plane: &Plane, range: (f32, f32)) -> bool {
+        let [a, b, c, d] = self.layers.masks;
+        let before = (a | b) | (c | d);
+        let count = *self.state as usize;
+        // Most often it lies beside the other layers.
+        if before & mask != 0 || count >= MOST_LAYERS {
+            return self.add_layer_over_others(mask, plane, range);
+        }
+        self.put(count, mask, plane, range, before | mask);
+        true
+    }
+
+    /// Draws a plane as layer `count`, where `covered` is what all layers cover.
+    #[inline(always)]
+    fn put(
+        &mut self,
+        count: usize,
+        mask: Mask,
+        plane: &Plane,
+        (low, high): (f32, f32),
+        covered: Mask,
+    ) {
+        // Before the next one is written: a wider read would wait for it.
+        let [a, b, c, d] = self.layers.least;
+        self.layers.put(count, mask, plane, (low, high));
+        *self.state = count as State + 1;
+        *self.nearest = greatest(*self.nearest, high);
+        if covered == Mask::MAX {
+            let least_of_all = least(least(least(a, b), least(c, d)), low);
+            *self.farthest = greatest(*self.farthest, least_of_all);
+        }
+    }
+
+    #[inline(never)]
+    fn add_layer_over_others(
         &mut self,
         mut mask: Mask,
         plane: &Plane,
@@ -250,13 +297,7 @@ impl Tile<'_> {
             *self.state = MOST_LAYERS as State;
             return false;
         }
-        layers.put(count, mask, plane, (low, high));
-        *self.state = count as State + 1;
-        *self.nearest = greatest(*self.nearest, high);
-        if covered == Mask::MAX {
-            let least_of_all = layers.least[..=count].iter().fold(low, |a, b| least(*b, a));
-            *self.farthest = greatest(*self.farthest, least_of_all);
-        }
+        self.put(count, mask, plane, (low, high), covered);
         true
     }
 }
