@@ -30,9 +30,10 @@ impl Edges {
         let right = three(|k| t.y[k] - t.y[next(k)]);
         let down = three(|k| t.x[next(k)] - t.x[k]);
         let bias = three(|k| {
-            let is_top_left = right[k] > 0 || (right[k] == 0 && down[k] > 0);
-            let is_top_left = is_top_left && !is_planted!(fault, EdgesOfNoSide);
-            if is_top_left || is_planted!(fault, EdgesOfBothSides) { 0 } else { -1 }
+            // Without branches, which no processor would foretell.
+            let is_top_left = (right[k] > 0) | ((right[k] == 0) & (down[k] > 0));
+            let is_top_left = is_top_left & !is_planted!(fault, EdgesOfNoSide);
+            i32::from(is_top_left | is_planted!(fault, EdgesOfBothSides)) - 1
         });
         Self { right, down, bias }
     }

@@ -357,16 +357,19 @@ impl<'a> Pixels<'a> {
     /// The farthest of them, and which one it is.
     #[inline(never)]
     fn farthest_of_all(&mut self, witness: &mut u8) -> f32 {
-        let mut farthest = [f32::MAX; SIDE];
-        for row in 0..SIDE {
-            let pixels = self.row(row);
-            farthest = lanes(|l| least(pixels[l], farthest[l]));
-        }
-        let farthest_of_all = least_of(&farthest);
-        let column = (0..SIDE - 1).find(|l| farthest[*l] <= farthest_of_all).unwrap_or(SIDE - 1);
-        let row = (0..SIDE - 1).find(|row| self.row(*row)[column] <= farthest_of_all);
-        *witness = (row.unwrap_or(SIDE - 1) * SIDE + column) as u8;
-        farthest_of_all
+        with_eight!(eight => {
+            let mut farthest = [f32::MAX; SIDE];
+            for row in 0..SIDE {
+                let pixels = self.row(row);
+                farthest = lanes(|l| least(pixels[l], farthest[l]));
+            }
+            let farthest_of_all = least_of(&farthest);
+            let here = eight.at_least(&[farthest_of_all; SIDE], &farthest);
+            let column = here.trailing_zeros() as usize % SIDE;
+            let row = (0..SIDE - 1).find(|row| self.row(*row)[column] <= farthest_of_all);
+            *witness = (row.unwrap_or(SIDE - 1) * SIDE + column) as u8;
+            farthest_of_all
+        })
     }
 }
 
