@@ -181,24 +181,19 @@ impl Quotient {
     fn new(dividend: i64, divisor: i64) -> Self {
         // In float64, because some processors divide 64-bit integers slowly.
         #[expect(clippy::cast_possible_truncation, reason = "rounded towards zero, then corrected")]
-        let mut whole = (dividend as f64 / divisor as f64) as i64;
-        let mut rest = dividend - whole * divisor;
-        if rest < 0 {
-            (whole, rest) = (whole - 1, rest + divisor);
-        } else if rest >= divisor {
-            (whole, rest) = (whole + 1, rest - divisor);
-        }
-        Self { whole, rest }
+        let whole = (dividend as f64 / divisor as f64) as i64;
+        let rest = dividend - whole * divisor;
+        let over = i64::from(rest >= divisor) - i64::from(rest < 0);
+        Self { whole: whole + over, rest: rest - over * divisor }
     }
 
     #[inline(always)]
     fn add(&mut self, other: Self, divisor: i64, fault: Planted) {
         self.whole += other.whole;
         self.rest += other.rest;
-        if self.rest >= divisor && !is_planted!(fault, RemaindersDropped) {
-            self.whole += 1;
-            self.rest -= divisor;
-        }
+        let is_over = (self.rest >= divisor) & !is_planted!(fault, RemaindersDropped);
+        self.whole += i64::from(is_over);
+        self.rest -= if is_over { divisor } else { 0 };
     }
 }
 
