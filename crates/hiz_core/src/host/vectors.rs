@@ -458,6 +458,11 @@ mod tests {
             }
             let vectors = with_eight!(eight => eight.rows_with_negative(&linear));
             assert_eq!(vectors, plain, "{numbers:?}");
+            let first = [
+                Plain.any_negative(&along, &at),
+                with_eight!(eight => eight.any_negative(&along, &at)),
+            ];
+            assert_eq!(first, [plain as u32 & 0xFF; 2], "{numbers:?}");
             are_raised(&linear, 8, plain);
             for columns in 1..8 {
                 let mut narrow = along;

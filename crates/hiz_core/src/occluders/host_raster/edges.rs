@@ -269,6 +269,7 @@ pub(super) fn to_pixels(units: i32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::vectors::Plain;
 
     /// Numbers that look random (Steele, Lea and Flood 2014).
     struct Numbers(u64);
@@ -282,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_end_where_the_edges_of_each_tile_say() {
+    fn tiles_of_a_row_are_met_and_covered_as_the_edges_of_each_say() {
         let mut numbers = Numbers(7);
         let mut met_and_covered = [0; 2];
         for case in 0..2000 {
@@ -308,8 +309,15 @@ mod tests {
             for row in top..top + 20 {
                 let found = spans.row();
                 spans.step_down();
+                let mut together = [0; 2];
                 for column in begin..=end {
                     let at = at(column, row);
+                    let l = (column - begin) as usize % LANES;
+                    if l == 0 {
+                        let tiles = steps.along_tiles(&at);
+                        together = [steps.gain, steps.loss]
+                            .map(|spare| !Plain.any_negative(&tiles, &spare));
+                    }
                     let all = |spare: &[i32; 3]| (0..3).all(|k| at[k] + i64::from(spare[k]) >= 0);
                     for (i, expected) in
                         [all(&steps.gain), all(&steps.loss)].into_iter().enumerate()
@@ -320,6 +328,7 @@ mod tests {
                             expected,
                             "{t:?} {column} {row}"
                         );
+                        assert_eq!(together[i] >> l & 1 == 1, expected, "{t:?} {column} {row}");
                         met_and_covered[i] += u32::from(expected);
                     }
                 }

@@ -379,7 +379,7 @@ fn within_limits(
 const FEWEST_PLANNED: usize = 4;
 
 /// Meshlets are drawn in parts if so many pixels of their box come to each triangle.
-const SPLIT_FROM: i64 = 512;
+const SPLIT_FROM: i64 = 256;
 
 /// Triangles of a meshlet are sorted if so many pixels of its box come to each of them.
 const SORTED_FROM: i64 = 1024;
