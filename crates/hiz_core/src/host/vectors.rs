@@ -66,12 +66,14 @@ pub(crate) struct Linear<'a> {
     pub(crate) down: &'a [i32; 3],
 }
 
-/// Some numbers of an image: the first ones of rows that begin so many numbers apart.
+/// Some numbers of an image.
 #[derive(Debug)]
 pub(crate) struct Rows<'a> {
+    /// From the first one on.
     pub(crate) numbers: &'a mut [f32],
+    /// From row to row.
     pub(crate) stride: usize,
-    /// Up to eight columns, of which some more may be read and written; and rows.
+    /// Up to eight; those after them, up to eight, may change with them.
     pub(crate) columns: usize,
     pub(crate) rows: usize,
 }
@@ -102,8 +104,8 @@ pub(crate) trait Eight: Copy {
     /// Eight rows of eight bits: set where a function is negative.
     fn rows_with_negative(self, linear: &Linear<'_>) -> u64;
 
-    /// Raises numbers to the lesser one of `most` and `along` plus `below` their row, and to 0,
-    /// where no function is negative.
+    /// Raises numbers, none of which is negative, to the lesser one of `most` and the sum of `along`
+    /// and what is `below` in their row, where no function is negative.
     fn raise(
         self,
         rows: Rows<'_>,
@@ -158,12 +160,13 @@ impl Eight for Plain {
         below: impl Fn(usize) -> f32,
         most: f32,
     ) {
-        let mut values = *linear.along;
-        for k in 0..3 {
-            for l in 0..8 {
-                values[k][l] += linear.at[k];
+        let add = |values: &mut [[i32; 8]; 3], added: &[i32; 3]| {
+            for (values, added) in values.iter_mut().zip(added) {
+                values.iter_mut().for_each(|value| *value += added);
             }
-        }
+        };
+        let mut values = *linear.along;
+        add(&mut values, &linear.at);
         for row in 0..rows.rows {
             let below = below(row);
             let numbers: &mut [f32; 8] = bytemuck::cast_mut(rows.halves::<2>(row));
@@ -174,11 +177,7 @@ impl Eight for Plain {
                 let raised = f32::from_bits(sum.to_bits() & inside);
                 numbers[l] = if raised > numbers[l] { raised } else { numbers[l] };
             }
-            for k in 0..3 {
-                for l in 0..8 {
-                    values[k][l] += linear.down[k];
-                }
-            }
+            add(&mut values, linear.down);
         }
     }
 
@@ -448,13 +447,12 @@ mod tests {
             let down = [0, 1, 2].map(|k| numbers[k + 3] / 4);
             let linear = Linear { at, along: &along, down: &down };
             let plain = Plain.rows_with_negative(&linear);
-            for row in 0..8 {
-                for l in 0..8 {
-                    let value = |k: usize| at[k] + along[k][l] + row * down[k];
-                    let expected = (0..3).any(|k| value(k) < 0);
-                    assert_eq!(plain >> (8 * row) >> l & 1 == 1, expected, "{numbers:?}");
-                    counts[usize::from(expected)] += 1;
-                }
+            for bit in 0..64 {
+                let (row, l) = (bit / 8, bit % 8);
+                let value = |k: usize| at[k] + along[k][l] + row as i32 * down[k];
+                let expected = (0..3).any(|k| value(k) < 0);
+                assert_eq!(plain >> bit & 1 == 1, expected, "{numbers:?}");
+                counts[usize::from(expected)] += 1;
             }
             let vectors = with_eight!(eight => eight.rows_with_negative(&linear));
             assert_eq!(vectors, plain, "{numbers:?}");

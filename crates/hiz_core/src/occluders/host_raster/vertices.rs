@@ -117,7 +117,7 @@ impl Vertices {
         let (x, y) = (part(&mut self.x, group), part(&mut self.y, group));
         let nearness = part(&mut self.nearness, group);
         let code = part(&mut self.code, group);
-        // Number by number, not vertex by vertex: of this compilers make vectors.
+        // Number by number, not vertex by vertex, so that compilers make vectors.
         let row = |k: usize| {
             let [a, b, c, d] = lens.rows[k];
             lanes(|i| a * from_eye[0][i] + b * from_eye[1][i] + (c * from_eye[2][i] + d))
