@@ -52,6 +52,17 @@ pub(crate) struct Meshlet {
     pub(crate) closed: Option<u32>,
 }
 
+/// A part of a meshlet: [`PART_GROUPS`] of its triangles.
+#[derive(Debug)]
+pub(crate) struct Part {
+    /// The box around them, in mesh coordinates.
+    pub(crate) min: Vec3,
+    pub(crate) max: Vec3,
+    /// A bit for each group of [`LANES`] vertices of the meshlet's block that they name some of.
+    pub(crate) vertices: u16,
+}
+const _: () = assert!(MAX_VERTICES / LANES <= u16::BITS as usize, "a bit for each group");
+
 /// What a meshlet has of closed parts of its mesh.
 #[derive(Debug, Clone)]
 pub(crate) struct ClosedOf {
@@ -80,8 +91,7 @@ pub(crate) struct Blocks {
     pub(crate) low: [Vec<f32>; 3],
     /// Corners of [`LANES`] triangles, as vertices of the meshlet's block.
     pub(crate) corners: Vec<[[u8; LANES]; 3]>,
-    /// The box around each part of a meshlet, in mesh coordinates: its corners `[min, max]`.
-    pub(crate) parts: Vec<[Vec3; 2]>,
+    pub(crate) parts: Vec<Part>,
     /// For the meshlets that have [`Meshlet::closed`].
     pub(crate) closed: Vec<ClosedOf>,
     pub(crate) closed_parts: Vec<ClosedPart>,
@@ -311,14 +321,16 @@ impl Open {
         memory::reserve(&mut blocks.parts, self.corners.len().div_ceil(PART), "meshlets")?;
         for part in self.corners.chunks(PART) {
             let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+            let mut vertices = 0;
             for corner in part.as_flattened() {
+                vertices |= 1 << (usize::from(*corner) / LANES);
                 let p = positions[self.vertices[usize::from(*corner)] as usize];
                 for k in 0..3 {
                     min[k] = min[k].min(p[k]);
                     max[k] = max[k].max(p[k]);
                 }
             }
-            blocks.parts.push([min, max]);
+            blocks.parts.push(Part { min, max, vertices });
         }
         let closed = self.closed_of(closed, blocks)?;
         meshlets.push(Meshlet {
@@ -395,11 +407,13 @@ mod tests {
             next = m.triangles.end;
             assert!(m.triangles.len() <= MAX_TRIANGLES && m.num_vertices as usize <= MAX_VERTICES);
             for (i, t) in m.triangles.clone().enumerate() {
-                let [low, high] = blocks.parts[m.first_part as usize + i / PART];
+                let Part { min: low, max: high, vertices } =
+                    &blocks.parts[m.first_part as usize + i / PART];
                 let corners = blocks.corners[m.first_group as usize + i / LANES];
                 for (k, v) in triangles[t as usize - 10].iter().enumerate() {
                     let local = u32::from(corners[k][i % LANES]);
                     assert!(local < m.num_vertices);
+                    assert!(vertices >> (local as usize / LANES) & 1 == 1);
                     for (axis, p) in positions[*v as usize].into_iter().enumerate() {
                         assert!((m.min[axis]..=m.max[axis]).contains(&p));
                         assert!((low[axis]..=high[axis]).contains(&p));

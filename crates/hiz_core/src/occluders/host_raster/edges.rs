@@ -1,6 +1,6 @@
 //! What a triangle does from pixel to pixel and from tile to tile: its edges and its depth.
 
-use crate::host::vectors::Eight;
+use crate::host::vectors::{Eight, Linear};
 use crate::occluders::host_raster::lanes::{lanes, least, three};
 use crate::occluders::host_raster::lens::{HALF, UNITS};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
@@ -30,9 +30,10 @@ impl Edges {
         let right = three(|k| t.y[k] - t.y[next(k)]);
         let down = three(|k| t.x[next(k)] - t.x[k]);
         let bias = three(|k| {
-            let is_top_left = right[k] > 0 || (right[k] == 0 && down[k] > 0);
-            let is_top_left = is_top_left && !is_planted!(fault, EdgesOfNoSide);
-            if is_top_left || is_planted!(fault, EdgesOfBothSides) { 0 } else { -1 }
+            // Without branches, which no processor would foretell.
+            let is_top_left = (right[k] > 0) | ((right[k] == 0) & (down[k] > 0));
+            let is_top_left = is_top_left & !is_planted!(fault, EdgesOfNoSide);
+            i32::from(is_top_left | is_planted!(fault, EdgesOfBothSides)) - 1
         });
         Self { right, down, bias }
     }
@@ -55,47 +56,21 @@ impl Edges {
         })
     }
 
-    /// The functions along the columns of a tile's first row, given those at its first pixel.
+    /// What the functions gain along the columns of a tile.
     #[inline(always)]
-    pub(super) fn columns(&self, at: [i32; 3]) -> [[i32; LANES]; 3] {
-        three(|k| lanes(|l| at[k] + self.right[k] * l as i32))
+    pub(super) fn along(&self) -> [[i32; LANES]; 3] {
+        three(|k| lanes(|l| self.right[k] * l as i32))
     }
 
     /// Which pixels of a tile are inside, given the functions at its first pixel.
     #[inline(always)]
-    pub(super) fn mask(&self, eight: impl Eight, at: [i32; 3]) -> Mask {
-        let mut outside = 0;
-        for k in 0..3 {
-            // Most edges do not cross the tile.
-            if at[k] + (STEP - 1) * (self.right[k].min(0) + self.down[k].min(0)) >= 0 {
-                continue;
-            }
-            let mut edge = lanes(|l| at[k] + self.right[k] * l as i32);
-            for row in 0..SIDE {
-                outside |= Mask::from(eight.negative(&edge)) << (SIDE * row);
-                edge = lanes(|l| edge[l] + self.down[k]);
-            }
-        }
-        !outside
-    }
-
-    #[inline(always)]
-    pub(super) fn step_down(&self, edges: &mut [[i32; LANES]; 3]) {
-        for k in 0..3 {
-            for l in 0..LANES {
-                edges[k][l] += self.down[k];
-            }
-        }
+    pub(super) fn mask(&self, eight: impl Eight, steps: &Steps, at: [i32; 3]) -> Mask {
+        !eight.rows_with_negative(&Linear { at, along: &steps.along, down: &self.down })
     }
 }
 
-/// For each column: all bits set if the pixel is inside of three edges.
-#[inline(always)]
-pub(super) fn inside(edges: &[[i32; LANES]; 3]) -> [u32; LANES] {
-    lanes(|l| !((edges[0][l] | edges[1][l] | edges[2][l]) >> 31) as u32)
-}
-
-/// Beyond this size the sign of an edge's function is the same over a tile.
+/// Beyond this size the sign of an edge's function is the same over [`LANES`] tiles in a row: from
+/// pixel to pixel it grows by 2^23 at most.
 pub(super) const LARGE: i64 = 1 << 30;
 
 /// What a triangle's functions do within a tile.
@@ -103,6 +78,9 @@ pub(super) struct Steps {
     /// What the edges' functions gain and lose at most within a tile.
     pub(super) gain: [i32; 3],
     pub(super) loss: [i32; 3],
+    /// What they gain along the columns of a tile, and from tile to tile along a row.
+    along: [[i32; LANES]; 3],
+    along_tiles: [[i32; LANES]; 3],
     /// The nearness at a tile's farthest and at its nearest corner, less that at its first pixel:
     /// along the row, and down the column.
     pub(super) low: [f32; 2],
@@ -120,9 +98,25 @@ impl Steps {
         Self {
             gain: three(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
             loss: three(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
+            along: edges.along(),
+            along_tiles: three(|k| lanes(|l| edges.right[k] * (STEP * l as i32))),
             low: [low(0), low(1)],
             high: [high(0), high(1)],
         }
+    }
+}
+
+impl Steps {
+    /// The edges' functions at the first pixels of [`LANES`] tiles in a row, given those of the
+    /// first one.
+    ///
+    /// Where they are [`LARGE`] their signs are right.
+    #[inline(always)]
+    pub(super) fn along_tiles(&self, at: &[i64; 3]) -> [[i32; LANES]; 3] {
+        three(|k| {
+            let first = at[k].clamp(-LARGE, LARGE) as i32;
+            lanes(|l| first + self.along_tiles[k][l])
+        })
     }
 }
 
@@ -187,24 +181,19 @@ impl Quotient {
     fn new(dividend: i64, divisor: i64) -> Self {
         // In float64, because some processors divide 64-bit integers slowly.
         #[expect(clippy::cast_possible_truncation, reason = "rounded towards zero, then corrected")]
-        let mut whole = (dividend as f64 / divisor as f64) as i64;
-        let mut rest = dividend - whole * divisor;
-        if rest < 0 {
-            (whole, rest) = (whole - 1, rest + divisor);
-        } else if rest >= divisor {
-            (whole, rest) = (whole + 1, rest - divisor);
-        }
-        Self { whole, rest }
+        let whole = (dividend as f64 / divisor as f64) as i64;
+        let rest = dividend - whole * divisor;
+        let over = i64::from(rest >= divisor) - i64::from(rest < 0);
+        Self { whole: whole + over, rest: rest - over * divisor }
     }
 
     #[inline(always)]
     fn add(&mut self, other: Self, divisor: i64, fault: Planted) {
         self.whole += other.whole;
         self.rest += other.rest;
-        if self.rest >= divisor && !is_planted!(fault, RemaindersDropped) {
-            self.whole += 1;
-            self.rest -= divisor;
-        }
+        let is_over = (self.rest >= divisor) & !is_planted!(fault, RemaindersDropped);
+        self.whole += i64::from(is_over);
+        self.rest -= if is_over { divisor } else { 0 };
     }
 }
 
@@ -280,6 +269,7 @@ pub(super) fn to_pixels(units: i32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::vectors::Plain;
 
     /// Numbers that look random (Steele, Lea and Flood 2014).
     struct Numbers(u64);
@@ -293,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_end_where_the_edges_of_each_tile_say() {
+    fn tiles_of_a_row_are_met_and_covered_as_the_edges_of_each_say() {
         let mut numbers = Numbers(7);
         let mut met_and_covered = [0; 2];
         for case in 0..2000 {
@@ -319,8 +309,15 @@ mod tests {
             for row in top..top + 20 {
                 let found = spans.row();
                 spans.step_down();
+                let mut together = [0; 2];
                 for column in begin..=end {
                     let at = at(column, row);
+                    let l = (column - begin) as usize % LANES;
+                    if l == 0 {
+                        let tiles = steps.along_tiles(&at);
+                        together = [steps.gain, steps.loss]
+                            .map(|spare| !Plain.any_negative(&tiles, &spare));
+                    }
                     let all = |spare: &[i32; 3]| (0..3).all(|k| at[k] + i64::from(spare[k]) >= 0);
                     for (i, expected) in
                         [all(&steps.gain), all(&steps.loss)].into_iter().enumerate()
@@ -331,6 +328,7 @@ mod tests {
                             expected,
                             "{t:?} {column} {row}"
                         );
+                        assert_eq!(together[i] >> l & 1 == 1, expected, "{t:?} {column} {row}");
                         met_and_covered[i] += u32::from(expected);
                     }
                 }

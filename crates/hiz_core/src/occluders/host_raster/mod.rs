@@ -205,7 +205,7 @@ impl HostRaster {
             self.panes.cut(image, grid_for(&image, planned));
         }
         on_threads(threads, self.panes.by_work(&candidates), |pane| {
-            let mut vertices = Vertices::new();
+            let (mut vertices, mut triangles) = (Vertices::new(), Vec::new());
             for (candidate, drawn) in candidates.iter().zip(&drawn) {
                 let Candidate { extent, .. } = candidate;
                 if !pane.meets(extent) {
@@ -216,7 +216,16 @@ impl HostRaster {
                 }
                 drawn.store(true, Ordering::Relaxed);
                 let lens = &lenses[candidate.lens as usize];
-                draw_meshlet(scene.shapes, candidate, lens, faces, &image, pane, &mut vertices);
+                draw_meshlet(
+                    scene.shapes,
+                    candidate,
+                    lens,
+                    faces,
+                    &image,
+                    pane,
+                    &mut vertices,
+                    &mut triangles,
+                );
                 pane.renew();
             }
         });
@@ -277,8 +286,8 @@ impl HostRaster {
             let boxes = &shapes.blocks.parts[meshlet.first_part as usize..];
             let firsts = (0..candidate.groups.1).step_by(PART_GROUPS);
             memory::reserve(&mut parts, firsts.len(), "meshlets")?;
-            with_eight!(eight => for (first, [min, max]) in firsts.zip(boxes) {
-                if let Some(extent) = extent(eight, lens, &self.image, *min, *max) {
+            with_eight!(eight => for (first, part) in firsts.zip(boxes) {
+                if let Some(extent) = extent(eight, lens, &self.image, part.min, part.max) {
                     let end = candidate.groups.1.min(first + PART_GROUPS as u32);
                     parts.push(Candidate { groups: (first, end), extent, ..candidate });
                 }
@@ -382,11 +391,12 @@ fn within_limits(
 const FEWEST_PLANNED: usize = 4;
 
 /// Meshlets are drawn in parts if so many pixels of their box come to each triangle.
-const SPLIT_FROM: i64 = 32;
+const SPLIT_FROM: i64 = 256;
 
 /// Triangles of a meshlet are sorted if so many pixels of its box come to each of them.
 const SORTED_FROM: i64 = 1024;
 
+#[expect(clippy::too_many_arguments, reason = "what one loop over triangles needs")]
 fn draw_meshlet(
     shapes: &Shapes,
     candidate: &Candidate,
@@ -395,9 +405,12 @@ fn draw_meshlet(
     image: &Image,
     pane: &mut Pane,
     vertices: &mut Vertices,
+    triangles: &mut Vec<Triangle>,
 ) {
     let pixels = pane.pixels();
-    triangles_of(shapes, candidate, lens, faces, image, pixels, vertices, |t| pane.draw(t));
+    triangles.clear();
+    triangles_of(shapes, candidate, lens, faces, image, pixels, vertices, |t| triangles.push(*t));
+    pane.draw(triangles);
 }
 
 /// Hands out the triangles of a meshlet that may cover a centre in these columns and rows.

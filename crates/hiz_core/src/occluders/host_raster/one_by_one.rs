@@ -222,7 +222,7 @@ impl OneByOne {
         met.clear();
         each_triangle(looks, item, extent, image, pixels, vertices, |triangle| {
             met.add(triangle, image);
-            pane.draw(triangle);
+            pane.draw(std::slice::from_ref(triangle));
         });
         pane.renew();
     }

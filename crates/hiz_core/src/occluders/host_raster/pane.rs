@@ -4,12 +4,10 @@
 //! How a pixel's depth is computed depends on the triangle and on the image alone, so the number of
 //! panes changes no pixel.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::RangeInclusive;
 
-use crate::host::vectors::{Eight, with_eight};
-use crate::occluders::host_raster::edges::{
-    Edges, LARGE, STEP, Segment, Spans, Steps, bits, inside, to_pixels,
-};
+use crate::host::vectors::{Eight, Linear, Rows, with_eight};
+use crate::occluders::host_raster::edges::{Edges, STEP, Segment, Spans, Steps, bits, to_pixels};
 use crate::occluders::host_raster::lanes::{greatest, lanes, least, three};
 use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS};
 use crate::occluders::host_raster::planted_fault::is_planted;
@@ -46,6 +44,8 @@ pub(super) struct Pane {
     tiles: Vec<Tiles>,
     /// By tile: pixels were written since `farthest` was computed.
     is_stale: Vec<bool>,
+    /// By tile: a pixel of it that was the farthest one.
+    witnesses: Vec<u8>,
     /// The tiles that are stale, and some that no longer are.
     stale: Vec<u32>,
     /// By cell of 8x8 tiles: no pixel is farther than this.
@@ -81,6 +81,7 @@ impl Pane {
             stride,
             tiles: vec![Tiles::default(); count / LANES],
             is_stale: vec![false; count],
+            witnesses: vec![0; count],
             stale: Vec::new(),
             cells: vec![0.0; cells],
             is_cell_stale: vec![false; cells],
@@ -106,6 +107,7 @@ impl Pane {
         let floats = size_of_val(&self.cells[..]) + size_of_val(&self.pixels[..]);
         let tiles = size_of_val(&self.tiles[..])
             + size_of_val(&self.is_stale[..])
+            + size_of_val(&self.witnesses[..])
             + size_of_val(&self.is_cell_stale[..])
             + size_of_val(&self.slots[..]);
         let lists = size_of_val(&self.stale[..])
@@ -232,11 +234,6 @@ impl Pane {
     }
 
     #[inline(always)]
-    fn set_state(&mut self, index: usize, state: State) {
-        self.tiles[index / LANES].states[index % LANES] = state;
-    }
-
-    #[inline(always)]
     fn tile(&mut self, index: usize) -> Tile<'_> {
         let (tiles, l) = (&mut self.tiles[index / LANES], index % LANES);
         Tile {
@@ -246,13 +243,6 @@ impl Pane {
             layers: &mut self.layers[self.slots[index] as usize],
             fault: self.image.fault,
         }
-    }
-
-    /// The pixels of the tile in this column and row of the pane's.
-    #[inline(always)]
-    fn pixels_of(&mut self, (column, row): (usize, usize)) -> Pixels<'_> {
-        let first = row * SIDE * self.stride + column * SIDE;
-        Pixels { from_first: &mut self.pixels[first..], stride: self.stride }
     }
 
     /// The layers of a tile, if its state says that it has some.
@@ -273,8 +263,9 @@ impl Pane {
     fn settle(&mut self, index: usize) {
         if self.slots[index] == 0 {
             if self.used_layers == self.layers.len() {
-                self.layers.resize(2 * self.used_layers, Layers::default());
+                self.more_layers();
             }
+            self.layers[self.used_layers].clear();
             self.slots[index] = self.used_layers as u32;
             self.used_layers += 1;
         }
@@ -284,20 +275,46 @@ impl Pane {
         }
     }
 
+    #[cold]
+    #[inline(never)]
+    fn more_layers(&mut self) {
+        self.layers.resize(2 * self.used_layers, Layers::default());
+    }
+
     /// Turns whatever the tile in this column and row of the pane's is into pixels.
     #[inline(never)]
     fn expand(&mut self, (column, row): (usize, usize)) {
         let index = row * self.across + column;
-        let rows: [_; SIDE] = std::array::from_fn(|y| self.row_of_tile(column, row, y));
-        self.pixels_of((column, row)).fill(|y| rows[y]);
-        self.set_state(index, PIXELS);
+        let mut pixels = Pixels::new(&mut self.pixels, self.stride, (column, row));
+        let (tiles, l) = (&mut self.tiles[index / LANES], index % LANES);
+        match tiles.states[l] {
+            CLEAR => pixels.fill(|_| [0.0; SIDE]),
+            PIXELS => {}
+            state @ FULL.. => {
+                let plane = Plane::at(tiles.first[l], &self.rises[(state - FULL) as usize]);
+                pixels.fill(|y| plane.row(y));
+            }
+            state => {
+                let layers = &self.layers[self.slots[index] as usize];
+                pixels.fill(|y| row_of_layers(state, layers, y, self.image.fault));
+            }
+        }
+        tiles.states[l] = PIXELS;
+    }
+
+    /// Draws the parts of triangles that lie in this pane.
+    #[inline(never)]
+    pub(super) fn draw(&mut self, triangles: &[Triangle]) {
+        with_eight!(eight => for t in triangles {
+            self.draw_triangle(eight, t);
+        });
     }
 
     /// Draws the part of a triangle that lies in this pane.
     ///
     /// In which way is chosen by its part in the image, because their roundings differ.
-    #[inline(never)]
-    pub(super) fn draw(&mut self, t: &Triangle) {
+    #[inline(always)]
+    fn draw_triangle(&mut self, eight: impl Eight, t: &Triangle) {
         let bounds = |v: &[i32; 3]| (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
         let (left, right) = bounds(&t.x);
         let (up, down) = bounds(&t.y);
@@ -314,22 +331,35 @@ impl Pane {
         }
         let edges = Edges::new(t, self.image.fault);
         if is_narrow && right - left <= SMALL && down - up <= SMALL {
-            self.draw_by_rows(t, &edges, columns, rows);
+            self.draw_by_rows(eight, t, &edges, columns, rows);
         } else {
-            self.draw_by_tiles(t, &edges, columns, rows);
+            self.draw_by_tiles(eight, t, &edges, columns, rows);
         }
     }
 
     /// Draws a triangle of at most [`LANES`] columns, one segment for each row.
-    fn draw_by_rows(&mut self, t: &Triangle, edges: &Edges, columns: (i32, i32), rows: (i32, i32)) {
+    #[inline(always)]
+    fn draw_by_rows(
+        &mut self,
+        eight: impl Eight,
+        t: &Triangle,
+        edges: &Edges,
+        columns: (i32, i32),
+        rows: (i32, i32),
+    ) {
         let tile_row = |row: i32| (row - self.top) as usize / SIDE;
         let tile_column = |column: i32| (column - self.left) as usize / SIDE;
         let (begin, end) = (tile_column(columns.0), tile_column(columns.1));
+        let mut is_hidden = true;
         for row in tile_row(rows.0)..=tile_row(rows.1) {
             for column in begin..=end {
                 let tile = row * self.across + column;
-                let nearest = &mut self.tiles[tile / LANES].nearest[tile % LANES];
-                *nearest = greatest(*nearest, t.nearest);
+                let (tiles, l) = (&mut self.tiles[tile / LANES], tile % LANES);
+                if tiles.farthest[l] >= t.nearest {
+                    continue;
+                }
+                is_hidden = false;
+                tiles.nearest[l] = greatest(tiles.nearest[l], t.nearest);
                 if !self.is_stale[tile] {
                     self.is_stale[tile] = true;
                     self.stale.push(tile as u32);
@@ -339,31 +369,39 @@ impl Pane {
                 }
             }
         }
-        let mut at_row = edges.columns(edges.at_small(t, columns.0, rows.0));
+        if is_hidden {
+            return;
+        }
+        // Pixels of tiles that hide it stay as they are, and those of tiles that have none are not
+        // looked at before they are written again.
+        let at = edges.at_small(t, columns.0, rows.0);
         let x = to_pixels(columns.0 * UNITS + HALF - t.x[0]);
         let y = to_pixels(rows.0 * UNITS + HALF - t.y[0]);
         // `x + l` is exact, so the first column changes nothing.
         let along = lanes(|l| t.nearness + t.slope[0] * (x + l as f32));
-        let own_column = (columns.0 - self.left) as usize;
-        let mut at = (rows.0 - self.top) as usize * self.stride + own_column;
-        for row in 0..=rows.1 - rows.0 {
-            let below = t.slope[1] * (y + row as f32);
-            let Ok(pixels) = <&mut [f32; LANES]>::try_from(&mut self.pixels[at..at + LANES]) else {
-                unreachable!("a slice of this length")
-            };
-            let inside = inside(&at_row);
-            for l in 0..LANES {
-                let nearness = least(along[l] + below, t.nearest);
-                pixels[l] = greatest(f32::from_bits(nearness.to_bits() & inside[l]), pixels[l]);
-            }
-            edges.step_down(&mut at_row);
-            at += self.stride;
-        }
+        let first = (rows.0 - self.top) as usize * self.stride + (columns.0 - self.left) as usize;
+        let pixels = Rows {
+            numbers: &mut self.pixels[first..],
+            stride: self.stride,
+            columns: (columns.1 - columns.0) as usize + 1,
+            rows: (rows.1 - rows.0) as usize + 1,
+        };
+        let linear = Linear { at, along: &edges.along(), down: &edges.down };
+        eight.raise(
+            pixels,
+            &linear,
+            &along,
+            #[inline(always)]
+            |row| t.slope[1] * (y + row as f32),
+            t.nearest,
+        );
     }
 
     /// Draws a triangle tile by tile.
+    #[inline(always)]
     fn draw_by_tiles(
         &mut self,
+        eight: impl Eight,
         t: &Triangle,
         edges: &Edges,
         columns: (i32, i32),
@@ -376,18 +414,19 @@ impl Pane {
         if is_large && self.hides_all(t.nearest, (begin, end), rows) {
             return;
         }
-        let steps = Steps::new(t, edges, self.image.fault);
         self.rises.push(Rise { slope: t.slope, nearest: t.nearest });
-        with_eight!(eight => if end - begin < NARROW {
+        let steps = Steps::new(t, edges, self.image.fault);
+        if end - begin < NARROW {
             for row in first..=last {
-                self.draw_narrow(eight, t, edges, &steps, row, rows, (begin, end), is_large);
+                self.draw_narrow(eight, t, edges, &steps, row, (begin, end), is_large);
             }
         } else {
             self.draw_wide(eight, t, edges, &steps, (begin, end), (first, last));
-        });
+        }
     }
 
-    /// Draws a triangle into the tiles `begin..=end` of the rows `first..=last`, [`LANES`] at once.
+    /// Draws a triangle into the tiles `begin..=end` of the rows `first..=last`, which are many in a
+    /// row.
     #[inline(always)]
     fn draw_wide(
         &mut self,
@@ -399,39 +438,27 @@ impl Pane {
         (first, last): (i32, i32),
     ) {
         const MANY: i32 = LANES as i32;
-        let mut at = edges.at(t, begin * STEP, first * STEP);
-        let mut spans = Spans::new(&at, edges, steps, (begin, end), self.image.fault);
+        let mut at_begin = edges.at(t, begin * STEP, first * STEP);
+        let mut spans = Spans::new(&at_begin, edges, steps, (begin, end), self.image.fault);
         for row in first..=last {
             let [met, covered] = spans.row();
-            let at_row = at;
+            let at_row = at_begin;
             for k in 0..3 {
-                at[k] += i64::from(STEP * edges.down[k]);
+                at_begin[k] += i64::from(STEP * edges.down[k]);
             }
             spans.step_down();
             if met.0 >= met.1 {
                 continue;
             }
-            let y = to_pixels(row * STEP * UNITS + HALF - t.y[0]);
-            let own_row = (row - self.top / STEP) as usize;
             for group in met.0 / MANY..=(met.1 - 1) / MANY {
                 let column = group * MANY;
-                let own_group = (group - self.left / ACROSS as i32) as usize;
-                let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
-                let segment = Segment::new(t, steps, (x, y));
-                let tiles = own_row * (self.across / LANES) + own_group;
-                let state = FULL + self.rises.len() as State - 1;
-                let (met, covered) = (bits(met, column), bits(covered, column));
-                let Some(open) = self.tiles[tiles].replace(eight, &segment, met, covered, state)
-                else {
-                    continue;
+                let at = || {
+                    steps.along_tiles(&three(|k| {
+                        at_row[k] + i64::from(column - begin) * i64::from(STEP * edges.right[k])
+                    }))
                 };
-                let cell = own_row / LANES * (self.across / LANES) + own_group;
-                self.is_cell_stale[cell] = true;
-                let place = (own_group * LANES, own_row);
-                let at = three(|k| {
-                    at_row[k] + i64::from(column - begin) * i64::from(STEP * edges.right[k])
-                });
-                self.draw_segment(eight, t, edges, &segment, place, at, (open, covered));
+                let which = (bits(met, column), bits(covered, column));
+                self.draw_group(eight, t, edges, steps, (column, row), at, which, true);
             }
         }
     }
@@ -453,7 +480,7 @@ impl Pane {
         true
     }
 
-    /// Draws a triangle into the tiles `begin..=end` of a row, one by one.
+    /// Draws a triangle into the tiles `begin..=end` of a row, which are few.
     #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
     #[inline(always)]
     fn draw_narrow(
@@ -463,89 +490,65 @@ impl Pane {
         edges: &Edges,
         steps: &Steps,
         row: i32,
-        rows: (i32, i32),
         (begin, end): (i32, i32),
         is_large: bool,
     ) {
-        let mut at = edges.at(t, begin * STEP, row * STEP);
-        let below = t.slope[1] * to_pixels(row * STEP * UNITS + HALF - t.y[0]);
-        let rows = ((rows.0 - row * STEP).max(0), (rows.1 - row * STEP).min(STEP - 1));
-        let rows = rows.0 as usize..rows.1 as usize + 1;
-        let own_row = (row - self.top / STEP) as usize;
-        for column in begin..=end {
-            let here = at;
-            for k in 0..3 {
-                at[k] += i64::from(STEP * edges.right[k]);
+        const MANY: i32 = LANES as i32;
+        for group in begin / MANY..=end / MANY {
+            let column = group * MANY;
+            let at = steps.along_tiles(&edges.at(t, column * STEP, row * STEP));
+            let met = bits((begin, end + 1), column) & !eight.any_negative(&at, &steps.gain);
+            if met != 0 {
+                let covered = met & !eight.any_negative(&at, &steps.loss);
+                let which = (met, covered);
+                self.draw_group(eight, t, edges, steps, (column, row), || at, which, is_large);
             }
-            if (0..3).any(|k| here[k] + i64::from(steps.gain[k]) < 0) {
-                continue;
-            }
-            let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
-            let nearness = (t.nearness + t.slope[0] * x) + below;
-            let own_column = (column - self.left / STEP) as usize;
-            let index = own_row * self.across + own_column;
-            let high = least(steps.high[0] + (nearness + steps.high[1]), t.nearest);
-            if high <= self.farthest(index) {
-                continue;
-            }
-            let low = least(steps.low[0] + (nearness + steps.low[1]), t.nearest);
-            let is_full = (0..3).all(|k| here[k] + i64::from(steps.loss[k]) >= 0);
-            let here = three(|k| here[k].clamp(-LARGE, LARGE) as i32);
-            let plane = Plane { nearness, slope: t.slope, nearest: t.nearest };
-            let place = (own_column, own_row);
-            self.draw_tile(
-                eight,
-                place,
-                edges,
-                here,
-                plane,
-                (low, high),
-                is_full,
-                is_large,
-                rows.clone(),
-            );
-            let cell = own_row / LANES * (self.across / LANES);
-            self.is_cell_stale[cell + own_column / LANES] = true;
         }
     }
 
-    /// Draws a triangle into the tiles of a segment that are `open`.
+    /// Draws a triangle into [`LANES`] tiles in a row, of which the first one is in this column and
+    /// row of the image's tiles.
     ///
-    /// `place` and `at` are those of the segment's first tile, see [`Self::draw_tile`]; `covered`
-    /// are those that the triangle covers.
+    /// `at` are the edges' functions at their first pixels, and bits say which tiles the triangle
+    /// meets and which it covers.
     #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
     #[inline(always)]
-    fn draw_segment(
+    fn draw_group(
         &mut self,
         eight: impl Eight,
         t: &Triangle,
         edges: &Edges,
-        segment: &Segment,
-        place: (usize, usize),
-        at: [i64; 3],
-        (mut open, covered): (u32, u32),
+        steps: &Steps,
+        (column, row): (i32, i32),
+        at: impl FnOnce() -> [[i32; LANES]; 3],
+        (met, covered): (u32, u32),
+        is_large: bool,
     ) {
+        let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
+        let y = to_pixels(row * STEP * UNITS + HALF - t.y[0]);
+        let segment = Segment::new(t, steps, (x, y));
+        let own_row = (row - self.top / STEP) as usize;
+        let own_group = (column * STEP - self.left) as usize / ACROSS;
+        let tiles = own_row * (self.across / LANES) + own_group;
+        let state = FULL + self.rises.len() as State - 1;
+        let Some(mut open) = self.tiles[tiles].replace(eight, &segment, met, covered, state) else {
+            return;
+        };
+        let cell = own_row / LANES * (self.across / LANES) + own_group;
+        self.is_cell_stale[cell] = true;
+        if open == 0 {
+            return;
+        }
+        let at = at();
         while open != 0 {
             let l = open.trailing_zeros() as usize % LANES;
             open &= open - 1;
             let plane = Plane { nearness: segment.nearness[l], slope: t.slope, nearest: t.nearest };
             let range = (segment.low[l], segment.high[l]);
             let is_full = covered >> l & 1 == 1;
-            let at = three(|k| {
-                let at = at[k] + l as i64 * i64::from(STEP * edges.right[k]);
-                at.clamp(-LARGE, LARGE) as i32
-            });
-            self.draw_tile(
-                eight,
-                (place.0 + l, place.1),
-                edges,
-                at,
-                plane,
-                range,
-                is_full,
-                true,
-                0..SIDE,
-            );
+            let place = (own_group * LANES + l, own_row);
+            let at = three(|k| at[k][l]);
+            self.draw_tile(eight, place, edges, steps, at, plane, range, is_full, is_large);
         }
     }
 
@@ -560,12 +563,12 @@ impl Pane {
         eight: impl Eight,
         place: (usize, usize),
         edges: &Edges,
+        steps: &Steps,
         at: [i32; 3],
         plane: Plane,
         (low, high): (f32, f32),
         is_full: bool,
         is_large: bool,
-        rows: Range<usize>,
     ) {
         let index = place.1 * self.across + place.0;
         let l = index % LANES;
@@ -584,37 +587,32 @@ impl Pane {
             self.tiles[index / LANES].put(l, &plane, (low, high), state);
             return;
         }
+        let mask = if is_full { Mask::MAX } else { edges.mask(eight, steps, at) };
+        let shifted = if is_planted!(self.image.fault, MasksShifted) { SIDE } else { 0 };
+        let mask = mask << shifted;
+        if mask == 0 {
+            return;
+        }
         if self.state(index) != PIXELS && (is_large || is_full) {
-            let mask = if is_full { Mask::MAX } else { edges.mask(eight, at) };
-            let shifted = if is_planted!(self.image.fault, MasksShifted) { SIDE } else { 0 };
-            let mask = mask << shifted;
-            if mask == 0 {
+            self.settle(index);
+            let mut tile = self.tile(index);
+            if *tile.state == CLEAR {
+                tile.first_layer(mask, &plane, (low, high));
                 return;
             }
-            self.settle(index);
-            if self.tile(index).add_layer(mask, plane, (low, high)) {
+            if tile.add_layer(mask, &plane, (low, high)) {
                 return;
             }
         }
         if self.state(index) != PIXELS {
             self.expand(place);
         }
-        let nearest = &mut self.tiles[index / LANES].nearest[l];
-        *nearest = greatest(*nearest, high);
+        let tiles = &mut self.tiles[index / LANES];
+        tiles.nearest[l] = greatest(tiles.nearest[l], high);
         self.is_stale[index] = false;
-        let mut pixels = self.pixels_of(place);
-        let farthest = if is_full {
-            pixels.draw(&plane, 0..SIDE, |_| [u32::MAX; SIDE])
-        } else {
-            let skipped = rows.start as i32;
-            let mut at_row = edges.columns(three(|k| at[k] + skipped * edges.down[k]));
-            pixels.draw(&plane, rows, |_| {
-                let inside = inside(&at_row);
-                edges.step_down(&mut at_row);
-                inside
-            })
-        };
-        self.tiles[index / LANES].farthest[l] = farthest;
+        let mut pixels = Pixels::new(&mut self.pixels, self.stride, place);
+        pixels.draw(&plane, mask);
+        tiles.farthest[l] = pixels.farthest(tiles.farthest[l], &mut self.witnesses[index]);
     }
 
     /// Computes the farthest depths again of the tiles whose pixels were written.
@@ -626,8 +624,9 @@ impl Pane {
                 let (row, column) = (index / self.across, index % self.across);
                 let cell = row / LANES * (self.across / LANES) + column / LANES;
                 self.is_cell_stale[cell] = true;
-                let farthest = self.pixels_of((column, row)).farthest();
                 let (tiles, l) = (&mut self.tiles[index / LANES], index % LANES);
+                let mut pixels = Pixels::new(&mut self.pixels, self.stride, (column, row));
+                let farthest = pixels.farthest(tiles.farthest[l], &mut self.witnesses[index]);
                 let is_wrong = is_planted!(self.image.fault, RenewedTooNear);
                 tiles.farthest[l] = if is_wrong { tiles.nearest[l] } else { farthest };
             }

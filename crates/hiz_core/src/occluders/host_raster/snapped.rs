@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::host::vectors::Plain;
 use crate::input::camera::Camera;
 use crate::input::mesh::FaceCull;
-use crate::occluders::host_raster::edges::{Edges, LARGE, STEP};
+use crate::occluders::host_raster::edges::{Edges, LARGE, STEP, Steps};
 use crate::occluders::host_raster::lanes::three;
 use crate::occluders::host_raster::lens::{HALF, Image, Lens, UNITS};
 use crate::occluders::host_raster::planted_fault::Planted;
@@ -149,8 +149,10 @@ impl Snapped {
         if (0..3).any(|k| at[k] + gain(k) < 0) {
             return 0;
         }
+        let steps = Steps::new(&self.triangle, &self.edges, Planted::default());
         self.edges.mask(
             Plain,
+            &steps,
             three(|k| {
                 #[expect(clippy::cast_possible_truncation, reason = "clamped")]
                 let at = at[k].clamp(-LARGE, LARGE) as i32;

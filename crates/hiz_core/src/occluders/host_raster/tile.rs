@@ -10,8 +10,6 @@
 //! Every way gives the same numbers: a pixel holds the greatest nearness of the planes that cover
 //! its centre.
 
-use std::ops::Range;
-
 use crate::host::vectors::{Eight, with_eight};
 use crate::occluders::host_raster::lanes::{greatest, lanes, least, least_of};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
@@ -113,17 +111,70 @@ pub(super) fn order(
     }
 }
 
-/// A plane where it is the nearest.
+/// The layers of a tile, of which its state counts those in use: planes where they are the nearest.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Layer {
-    mask: Mask,
-    plane: Plane,
-    least: f32,
-    greatest: f32,
+pub(super) struct Layers {
+    /// Those of layers that are not in use are 0.
+    masks: [Mask; MOST_LAYERS],
+    /// Those of layers that are not in use are infinite.
+    least: [f32; MOST_LAYERS],
+    greatest: [f32; MOST_LAYERS],
+    planes: [Plane; MOST_LAYERS],
 }
 
-/// The layers of a tile, of which its state counts those in use.
-pub(super) type Layers = [Layer; MOST_LAYERS];
+impl Layers {
+    #[inline(always)]
+    pub(super) fn clear(&mut self) {
+        self.masks = [0; MOST_LAYERS];
+        self.least = [f32::INFINITY; MOST_LAYERS];
+    }
+
+    #[inline(always)]
+    fn put(&mut self, k: usize, mask: Mask, plane: &Plane, (low, high): (f32, f32)) {
+        (self.masks[k], self.planes[k]) = (mask, *plane);
+        (self.least[k], self.greatest[k]) = (low, high);
+    }
+
+    /// Where a plane is nearer than all layers, of `mask`.
+    #[inline(never)]
+    fn shown(&self, mask: Mask, plane: &Plane, (low, high): (f32, f32), fault: Planted) -> Mask {
+        let mut shown = mask;
+        for k in 0..MOST_LAYERS {
+            if self.masks[k] & shown == 0 || low >= self.greatest[k] {
+                continue;
+            }
+            let hidden = if high > self.least[k] {
+                match order((plane, high), (&self.planes[k], self.greatest[k]), fault) {
+                    Some(true) => 0,
+                    Some(false) => self.masks[k],
+                    None => self.masks[k] & !nearer(plane, &self.planes[k]),
+                }
+            } else {
+                self.masks[k]
+            };
+            if !is_planted!(fault, LayersOverlap) {
+                shown &= !hidden;
+            }
+        }
+        shown
+    }
+
+    /// Moves layers that still cover something to the front; says how many they are.
+    #[inline(never)]
+    fn close_ranks(&mut self) -> usize {
+        let mut kept = 0;
+        for k in 0..MOST_LAYERS {
+            let mask = std::mem::take(&mut self.masks[k]);
+            let low = std::mem::replace(&mut self.least[k], f32::INFINITY);
+            if mask != 0 {
+                let (plane, range) = (self.planes[k], (low, self.greatest[k]));
+                self.put(kept, mask, &plane, range);
+                kept += 1;
+            }
+        }
+        kept
+    }
+}
 
 /// How the depth of a tile is kept: as so many layers, as [`PIXELS`], or as one plane ([`FULL`]).
 pub(super) type State = u32;
@@ -149,8 +200,8 @@ pub(super) struct Tile<'a> {
 /// The pixels of a tile.
 pub(super) struct Pixels<'a> {
     /// The pane's pixels from the tile's first one on, and how many there are in a row.
-    pub(super) from_first: &'a mut [f32],
-    pub(super) stride: usize,
+    from_first: &'a mut [f32],
+    stride: usize,
 }
 
 /// One row of a mask: all bits of a lane for a pixel that is covered.
@@ -164,69 +215,100 @@ impl Tile<'_> {
     /// Makes the plane of a tile that is [`FULL`] its first layer.
     #[inline(always)]
     pub(super) fn settle(&mut self, plane: Plane) {
-        let (least, greatest) = (*self.farthest, *self.nearest);
-        self.layers[0] = Layer { mask: Mask::MAX, plane, least, greatest };
+        self.layers.clear();
+        self.layers.put(0, Mask::MAX, &plane, (*self.farthest, *self.nearest));
         *self.state = 1;
+    }
+
+    /// Draws a plane where `mask` is set, as the only layer.
+    #[inline(always)]
+    pub(super) fn first_layer(&mut self, mask: Mask, plane: &Plane, range: (f32, f32)) {
+        self.layers.clear();
+        self.layers.put(0, mask, plane, range);
+        *self.state = 1;
+        *self.nearest = range.1;
     }
 
     /// Draws a plane where `mask` is set, as one more layer; false if that would need pixels.
     ///
     /// The tile must have layers.
-    pub(super) fn add_layer(
+    #[inline(always)]
+    pub(super) fn add_layer(&mut self, mask: Mask, plane: &Plane, range: (f32, f32)) -> bool {
+        let [a, b, c, d] = self.layers.masks;
+        let before = (a | b) | (c | d);
+        let count = *self.state as usize;
+        // Most often it lies beside the other layers.
+        if before & mask != 0 || count >= MOST_LAYERS {
+            return self.add_layer_over_others(mask, plane, range);
+        }
+        self.put(count, mask, plane, range, before | mask);
+        true
+    }
+
+    /// Draws a plane as layer `count`, where `covered` is what all layers cover.
+    #[inline(always)]
+    fn put(
         &mut self,
-        mut mask: Mask,
-        plane: Plane,
+        count: usize,
+        mask: Mask,
+        plane: &Plane,
         (low, high): (f32, f32),
-    ) -> bool {
-        let count = (*self.state as usize).min(MOST_LAYERS);
-        for layer in &self.layers[..count] {
-            if layer.mask & mask == 0 || low >= layer.greatest {
-                continue;
-            }
-            let hidden = if high > layer.least {
-                match order((&plane, high), (&layer.plane, layer.greatest), self.fault) {
-                    Some(true) => 0,
-                    Some(false) => layer.mask,
-                    None => layer.mask & !nearer(&plane, &layer.plane),
-                }
-            } else {
-                layer.mask
-            };
-            if !is_planted!(self.fault, LayersOverlap) {
-                mask &= !hidden;
-            }
-        }
-        if mask == 0 {
-            return true;
-        }
-        let (mut kept, mut covered, mut farthest) = (0, mask, low);
-        for k in 0..count {
-            let left = self.layers[k].mask & !mask;
-            if left != 0 {
-                covered |= left;
-                farthest = least(farthest, self.layers[k].least);
-                if kept < k {
-                    self.layers[kept] = self.layers[k];
-                }
-                self.layers[kept].mask = left;
-                kept += 1;
-            }
-        }
-        *self.state = kept as State;
-        if kept == MOST_LAYERS {
-            return false;
-        }
-        self.layers[kept] = Layer { mask, plane, least: low, greatest: high };
-        *self.state += 1;
+        covered: Mask,
+    ) {
+        // Before the next one is written: a wider read would wait for it.
+        let [a, b, c, d] = self.layers.least;
+        self.layers.put(count, mask, plane, (low, high));
+        *self.state = count as State + 1;
         *self.nearest = greatest(*self.nearest, high);
         if covered == Mask::MAX {
-            *self.farthest = greatest(*self.farthest, farthest);
+            let least_of_all = least(least(least(a, b), least(c, d)), low);
+            *self.farthest = greatest(*self.farthest, least_of_all);
         }
+    }
+
+    #[inline(never)]
+    fn add_layer_over_others(
+        &mut self,
+        mut mask: Mask,
+        plane: &Plane,
+        (low, high): (f32, f32),
+    ) -> bool {
+        let Self { layers, fault, .. } = self;
+        // Most often all of it shows.
+        let is_behind = |k: usize| (layers.masks[k] & mask != 0) & (low < layers.greatest[k]);
+        if is_behind(0) | is_behind(1) | is_behind(2) | is_behind(3) {
+            mask = layers.shown(mask, plane, (low, high), *fault);
+            if mask == 0 {
+                return true;
+            }
+        }
+        let mut count = *self.state as usize;
+        let before = layers.masks;
+        let covered = mask | (before[0] | before[1]) | (before[2] | before[3]);
+        let is_lost = |k: usize| (before[k] != 0) & (before[k] & !mask == 0);
+        let is_any_lost = is_lost(0) | is_lost(1) | is_lost(2) | is_lost(3);
+        for k in 0..MOST_LAYERS {
+            layers.masks[k] = before[k] & !mask;
+        }
+        if is_any_lost {
+            count = layers.close_ranks();
+        }
+        if count >= MOST_LAYERS {
+            *self.state = MOST_LAYERS as State;
+            return false;
+        }
+        self.put(count, mask, plane, (low, high), covered);
         true
     }
 }
 
-impl Pixels<'_> {
+impl<'a> Pixels<'a> {
+    /// Those of the tile in this column and row of a pane's `pixels`.
+    #[inline(always)]
+    pub(super) fn new(pixels: &'a mut [f32], stride: usize, (column, row): (usize, usize)) -> Self {
+        Self { from_first: &mut pixels[row * SIDE * stride + column * SIDE..], stride }
+    }
+
     #[inline(always)]
     fn row(&mut self, row: usize) -> &mut [f32; SIDE] {
         let first = row * self.stride;
@@ -245,51 +327,57 @@ impl Pixels<'_> {
         }
     }
 
-    /// Draws a plane into those that `covered` names, row by row of `rows`; returns the farthest of
-    /// all.
+    /// Draws a plane into those that `mask` names, which must be some.
     #[inline(always)]
-    pub(super) fn draw(
-        &mut self,
-        plane: &Plane,
-        rows: Range<usize>,
-        mut covered: impl FnMut(usize) -> [u32; SIDE],
-    ) -> f32 {
-        let mut farthest = [f32::MAX; SIDE];
-        for row in (0..rows.start).chain(rows.end..SIDE) {
-            let pixels = self.row(row);
-            farthest = lanes(|l| least(pixels[l], farthest[l]));
-        }
-        for row in rows {
-            let (covered, nearness) = (covered(row), plane.row(row));
+    pub(super) fn draw(&mut self, plane: &Plane, mask: Mask) {
+        let first = mask.trailing_zeros() as usize / SIDE;
+        let last = (Mask::BITS - 1 - mask.leading_zeros()) as usize / SIDE;
+        for row in first..=last {
+            let (covered, nearness) = (mask_row(mask, row), plane.row(row));
             let pixels = self.row(row);
             for l in 0..SIDE {
                 let drawn = f32::from_bits(nearness[l].to_bits() & covered[l]);
                 pixels[l] = greatest(drawn, pixels[l]);
-                farthest[l] = least(pixels[l], farthest[l]);
             }
         }
-        least_of(&farthest)
     }
 
-    /// The farthest of them.
-    #[inline(never)]
-    pub(super) fn farthest(&mut self) -> f32 {
-        let mut farthest = [f32::MAX; SIDE];
-        for row in 0..SIDE {
-            let pixels = self.row(row);
-            for l in 0..SIDE {
-                farthest[l] = least(pixels[l], farthest[l]);
-            }
+    /// The farthest of them, if they were no farther than `before`.
+    ///
+    /// `witness` is a guess which one that is: while it is as far as before, none else is asked.
+    #[inline(always)]
+    pub(super) fn farthest(&mut self, before: f32, witness: &mut u8) -> f32 {
+        let (row, column) = (usize::from(*witness) / SIDE % SIDE, usize::from(*witness) % SIDE);
+        if self.row(row)[column] <= before {
+            return before;
         }
-        least_of(&farthest)
+        self.farthest_of_all(witness)
+    }
+
+    /// The farthest of them, and which one it is.
+    #[inline(never)]
+    fn farthest_of_all(&mut self, witness: &mut u8) -> f32 {
+        with_eight!(eight => {
+            let mut farthest = [f32::MAX; SIDE];
+            for row in 0..SIDE {
+                let pixels = self.row(row);
+                farthest = lanes(|l| least(pixels[l], farthest[l]));
+            }
+            let farthest_of_all = least_of(&farthest);
+            let here = eight.at_least(&[farthest_of_all; SIDE], &farthest);
+            let column = here.trailing_zeros() as usize % SIDE;
+            let row = (0..SIDE - 1).find(|row| self.row(*row)[column] <= farthest_of_all);
+            *witness = (row.unwrap_or(SIDE - 1) * SIDE + column) as u8;
+            farthest_of_all
+        })
     }
 }
 
 /// Whether layers cover all of a tile.
 #[cfg(feature = "methods")]
 pub(super) fn is_covered(state: State, layers: &Layers) -> bool {
-    let used = &layers[..(state as usize).min(MOST_LAYERS)];
-    used.iter().fold(0, |covered, layer| covered | layer.mask) == Mask::MAX
+    let used = &layers.masks[..(state as usize).min(MOST_LAYERS)];
+    used.iter().fold(0, |covered, mask| covered | mask) == Mask::MAX
 }
 
 /// Row `row` of a tile whose depth is in layers, not in pixels.
@@ -302,17 +390,17 @@ pub(super) fn row_of_layers(
 ) -> [f32; SIDE] {
     match state as usize {
         0 => [0.0; SIDE],
-        1 if layers[0].mask == Mask::MAX => {
+        1 if layers.masks[0] == Mask::MAX => {
             // What lies beyond the far plane has no depth.
             let least = if is_planted!(fault, BeyondFar) { f32::MIN } else { 0.0 };
-            let nearness = layers[0].plane.row(row);
+            let nearness = layers.planes[0].row(row);
             lanes(|l| greatest(nearness[l], least))
         }
         count => {
             let mut out = [0.0; SIDE];
-            for layer in &layers[..count.min(MOST_LAYERS)] {
-                let covered = mask_row(layer.mask, row);
-                let nearness = layer.plane.row(row);
+            for k in 0..count.min(MOST_LAYERS) {
+                let covered = mask_row(layers.masks[k], row);
+                let nearness = layers.planes[k].row(row);
                 for l in 0..SIDE {
                     // The layers' masks have no pixel in common.
                     let drawn = f32::from_bits(nearness[l].to_bits() & covered[l]);

@@ -11,7 +11,9 @@ use crate::occluders::host_raster::lens::{HALF, Image, LEAST_W, Lens, rounded};
 use crate::occluders::host_raster::planted_fault::is_planted;
 use crate::occluders::host_raster::sides::Sides;
 use crate::occluders::host_raster::triangle::Corner;
-use crate::occluders::meshlets::{Blocks, LANES, MAX_TRIANGLES, MAX_VERTICES, Meshlet};
+use crate::occluders::meshlets::{
+    Blocks, LANES, MAX_TRIANGLES, MAX_VERTICES, Meshlet, PART_GROUPS,
+};
 
 /// In a vertex' code: it needs clipping, since it is before the near plane or far outside.
 const CLIP: u32 = 1;
@@ -44,7 +46,7 @@ impl Vertices {
         }
     }
 
-    /// Projects the vertices of the triangles in `groups` of `meshlet`.
+    /// Projects the vertices of the triangles in `groups` of `meshlet`: of all or of one part.
     pub(super) fn project(
         &mut self,
         blocks: &Blocks,
@@ -76,12 +78,15 @@ impl Vertices {
             let first = first as usize;
             blocks.low.each_ref().map(|axis| axis[first..][..count * LANES].as_chunks().0)
         });
-        let used = if groups == meshlet.groups() {
-            0..count
+        let mut used = if groups == meshlet.groups() {
+            (1 << count) - 1
         } else {
-            groups_around(corners_of(blocks, meshlet, groups))
+            let part = groups.start as usize / PART_GROUPS;
+            u32::from(blocks.parts[meshlet.first_part as usize + part].vertices)
         };
-        for group in used {
+        while used != 0 {
+            let group = used.trailing_zeros() as usize;
+            used &= used - 1;
             let from_eye = three(
                 #[inline(always)]
                 |k| {
@@ -112,8 +117,14 @@ impl Vertices {
         let (x, y) = (part(&mut self.x, group), part(&mut self.y, group));
         let nearness = part(&mut self.nearness, group);
         let code = part(&mut self.code, group);
+        // Number by number, not vertex by vertex, so that compilers make vectors.
+        let row = |k: usize| {
+            let [a, b, c, d] = lens.rows[k];
+            lanes(|i| a * from_eye[0][i] + b * from_eye[1][i] + (c * from_eye[2][i] + d))
+        };
+        let (all_px, all_py, all_n, all_w) = (row(0), row(1), row(2), row(3));
         for i in 0..LANES {
-            let [px, py, n, w] = lens.clip([from_eye[0][i], from_eye[1][i], from_eye[2][i]]);
+            let [px, py, n, w] = [all_px[i], all_py[i], all_n[i], all_w[i]];
             // NaN fails each of these, so it is clipped, and there it is dropped.
             let is_behind = (n <= w) | is_planted!(image.fault, NearUnclipped);
             let is_within = (px.abs() <= image.guard[0] * w) & (py.abs() <= image.guard[1] * w)
@@ -303,17 +314,4 @@ fn corners_of<'a>(
 ) -> &'a [[[u8; LANES]; 3]] {
     let corners = &blocks.corners[meshlet.first_group as usize..];
     &corners[groups.start as usize..groups.end as usize]
-}
-
-/// Groups of vertices from the first one to the last one that these corners name.
-///
-/// Vertices are in the order of their first triangles, so a part of a meshlet names few others.
-#[inline(always)]
-fn groups_around(corners: &[[[u8; LANES]; 3]]) -> Range<usize> {
-    let (mut first, mut last) = (u8::MAX, 0);
-    for corner in corners.as_flattened().as_flattened() {
-        first = first.min(*corner);
-        last = last.max(*corner);
-    }
-    usize::from(first) / LANES..usize::from(last) / LANES + 1
 }
