@@ -6,6 +6,11 @@
 // the pixels of a small rectangle.
 // Large rectangles are listed for the second one, which is in `pixels_large.wgsl`.
 //
+// Lavapipe ends all loops of eight invocations once they have taken MOST_ITERATIONS together
+// (`crates/hiz_core/src/cull/pixels.rs`), and then rectangles would have no counts.
+// So what a workgroup's loops may take is summed up before they take it, and what is too much for
+// them is listed, too.
+//
 // What is used here and defined elsewhere:
 //
 // - `pixels_planes.wgsl`, `pixels_planes_box.wgsl`, `pixels_planes_any.wgsl`: `PixelPlanes`,
@@ -28,6 +33,19 @@ const SMALL_ROWS: u32 = 1023u;
 const CLASSES_LOG2: u32 = 2u;
 const CLASSES: u32 = 40u;
 
+// What the loops of an invocation take for one rectangle beside its rows, at most.
+// These are those of `rectangle_of` and of `fill_planes`: 3, and 16 + 1 + 8 + 1 for a sphere's.
+// Loops over planes at each pixel are of 16 rounds at most, which Mesa unrolls.
+const AROUND_SMALL: u32 = 64u;
+
+// How many large rectangles there are in a row of the dispatch that counts them on a processor.
+const TEAMS_PER_ROW: u32 = 4096u;
+// What counts a large rectangle looks at so many pixels or more in an iteration of its loops.
+// Twin: `PIXELS_OF_ITERATION` in `crates/hiz_core/src/cull/pixels.rs`, which has the proof.
+const PIXELS_OF_ITERATION: u32 = 64u;
+// A flag in the list of large rectangles: it may be more than these loops can take.
+const IS_HUGE: u32 = 0x80000000u;
+
 // True: set the bit of each instance that may show in more than a negligible number of pixels.
 override SHOWN: bool;
 
@@ -48,7 +66,8 @@ struct Counting {
     negligible: u32,
     // How many instances a workgroup takes, up to MOST_ORDERED.
     ordered: u32,
-    padding: u32,
+    // How many iterations the loops over rectangles may take.
+    iterations: u32,
 }
 
 @group(1) @binding(0) var<uniform> piece: Piece;
@@ -56,8 +75,10 @@ struct Counting {
 @group(2) @binding(0) var<storage, read_write> counts: array<PixelCounts>;
 @group(2) @binding(1) var<storage, read_write> shown: array<atomic<u32>>;
 @group(2) @binding(2) var<uniform> counting: Counting;
-// How many instances have large rectangles, and which.
+// How many instances have large rectangles, and which; IS_HUGE is set beside some.
 @group(2) @binding(3) var<storage, read_write> large: array<atomic<u32>>;
+// On a processor, the arguments of the dispatch that counts these.
+@group(3) @binding(0) var<storage, read_write> teams: array<atomic<u32>, 3>;
 
 // Nothing is known about so many pixels.
 fn unknown(pixels: u32) -> PixelCounts {
@@ -159,6 +180,18 @@ fn size_class(rows: u32) -> u32 {
     return CLASSES - 1u - (part + (bit << CLASSES_LOG2));
 }
 
+// The most groups of four that a rectangle of a class meets.
+fn most_rows(class_here: u32) -> u32 {
+    let number = CLASSES - 1u - class_here;
+    let part = number & ((1u << CLASSES_LOG2) - 1u);
+    return ((part + (1u << CLASSES_LOG2) + 1u) << (number >> CLASSES_LOG2)) >> CLASSES_LOG2;
+}
+
+// Lists an instance as one with a large rectangle.
+fn list_large(entry: u32) {
+    atomicStore(&large[1u + atomicAdd(&large[0], 1u)], entry);
+}
+
 fn write_counts(i: u32, found: PixelCounts) {
     let index = caller_index(i);
     counts[index] = found;
@@ -237,7 +270,10 @@ fn key_of(i: u32) -> u32 {
         let class_here = size_class(rows);
         key = (class_here << CLASS_SHIFT) | atomicAdd(&classes[class_here], 1u);
     } else if own.is_open {
-        atomicStore(&large[1u + atomicAdd(&large[0], 1u)], i);
+        let pixels = (own.rectangle.z - own.rectangle.x + 1u)
+            * (own.rectangle.w - own.rectangle.y + 1u);
+        let is_huge = pixels / PIXELS_OF_ITERATION >= counting.iterations;
+        list_large(i | select(0u, IS_HUGE, is_huge));
     }
     return key;
 }
@@ -298,14 +334,29 @@ fn count_by(invocations: u32, group: u32, lane: u32) {
         }
     }
     workgroupBarrier();
-    t = lane;
+    // The smallest ones come first, so that what is left for others is the largest.
+    let begin = (max(small_count, 1u) - 1u) / invocations * invocations;
+    t = begin + lane;
+    var iterations = counting.iterations;
     loop {
-        if t < small_count {
-            count_alone(small[t]);
+        if t - lane < small_count {
+            // All of them take as long as the longest one, which is of the class of the first.
+            // It touches its rows in one loop, and looks at them in another.
+            let longest = keys[small[t - lane] - ordered * group] >> CLASS_SHIFT;
+            let needed = 2u * most_rows(longest) + AROUND_SMALL;
+            let is_enough = needed <= iterations;
+            iterations -= min(needed, iterations);
+            if t < small_count {
+                if is_enough {
+                    count_alone(small[t]);
+                } else {
+                    list_large(small[t]);
+                }
+            }
         }
-        t += invocations;
+        t -= invocations;
         continuing {
-            break if t >= small_count;
+            break if t >= begin + invocations;
         }
     }
 }
@@ -323,4 +374,11 @@ fn count_of_pixels_by_few(
     @builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32,
 ) {
     count_by(FEW, group.x, lane);
+    storageBarrier();
+    // A workgroup for each of the large rectangles that were listed so far.
+    let number = atomicLoad(&large[0]);
+    let rows = (number + TEAMS_PER_ROW - 1u) / TEAMS_PER_ROW;
+    atomicMax(&teams[0], min(number, TEAMS_PER_ROW));
+    atomicMax(&teams[1], rows);
+    atomicMax(&teams[2], 1u);
 }

@@ -279,7 +279,10 @@ fn others_change_no_count() {
     assert_eq!(counts_by_parts(&engine(), 600), alone);
     for (name, fault) in [
         ("places in a class left out", (" + (key & PLACE_MASK)] =", "] =")),
-        ("what comes second left out", ("break if t >= small_count;", "break if t >= lane;")),
+        (
+            "what comes second left out",
+            ("break if t >= begin + invocations;", "break if t >= view.runtime_zero;"),
+        ),
     ] {
         let engine = Engine::with_planted_faults(None, &[fault]).expect("a Vulkan driver");
         assert_ne!(counts_by_parts(&engine, 600), alone, "{name}: stayed green");

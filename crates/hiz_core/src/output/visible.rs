@@ -31,6 +31,8 @@ pub(crate) struct PieceOutput {
     pub(crate) pixels: Option<wgpu::Buffer>,
     /// Beside them, for their passes: which instances have large rectangles, behind their number.
     pub(crate) large: Option<wgpu::Buffer>,
+    /// The arguments of the dispatch for these, and what binds them, where each has a workgroup.
+    pub(crate) teams: OnceLock<(wgpu::Buffer, wgpu::BindGroup)>,
     /// Made by the first cull that tests groups.
     groups: OnceLock<GroupOutput>,
     /// What culls bind, made by the first of each kind.
@@ -314,6 +316,7 @@ impl PieceOutput {
             mask: gpu.empty("hiz.visible.mask", size, STORAGE)?,
             pixels: outputs.pixels.then(pixels).transpose()?,
             large: outputs.pixels.then(large).transpose()?,
+            teams: OnceLock::new(),
             groups: OnceLock::new(),
             bindings: Default::default(),
             counted: KeptBindings::new(NEGLIGIBLE_KEPT),
@@ -333,7 +336,8 @@ impl PieceOutput {
     fn size(&self) -> u64 {
         let of_groups = self.groups.get().map_or(0, GroupOutput::size);
         let of_pixels = [&self.pixels, &self.large].into_iter().flatten().map(wgpu::Buffer::size);
-        self.mask.size() + of_groups + of_pixels.sum::<u64>()
+        let of_teams = self.teams.get().map_or(0, |(arguments, _)| arguments.size());
+        self.mask.size() + of_groups + of_pixels.sum::<u64>() + of_teams
     }
 }
 
