@@ -43,8 +43,6 @@ const TEAMS_PER_ROW: u32 = 4096u;
 // What counts a large rectangle looks at so many pixels or more in an iteration of its loops.
 // Twin: `PIXELS_OF_ITERATION` in `crates/hiz_core/src/cull/pixels.rs`, which has the proof.
 const PIXELS_OF_ITERATION: u32 = 64u;
-// A flag in the list of large rectangles: it may be more than these loops can take.
-const IS_HUGE: u32 = 0x80000000u;
 
 // True: set the bit of each instance that may show in more than a negligible number of pixels.
 override SHOWN: bool;
@@ -75,10 +73,12 @@ struct Counting {
 @group(2) @binding(0) var<storage, read_write> counts: array<PixelCounts>;
 @group(2) @binding(1) var<storage, read_write> shown: array<atomic<u32>>;
 @group(2) @binding(2) var<uniform> counting: Counting;
-// How many instances have large rectangles, and which; IS_HUGE is set beside some.
+// How many instances have large rectangles, how many huge ones, and which.
+// The huge ones are listed from the end on.
 @group(2) @binding(3) var<storage, read_write> large: array<atomic<u32>>;
-// On a processor, the arguments of the dispatch that counts these.
-@group(3) @binding(0) var<storage, read_write> teams: array<atomic<u32>, 3>;
+const LISTED_FROM: u32 = 2u;
+// On a processor, the arguments of the dispatches that count large ones, and huge ones.
+@group(3) @binding(0) var<storage, read_write> teams: array<atomic<u32>, 6>;
 
 // Nothing is known about so many pixels.
 fn unknown(pixels: u32) -> PixelCounts {
@@ -188,8 +188,13 @@ fn most_rows(class_here: u32) -> u32 {
 }
 
 // Lists an instance as one with a large rectangle.
-fn list_large(entry: u32) {
-    atomicStore(&large[1u + atomicAdd(&large[0], 1u)], entry);
+fn list_large(i: u32) {
+    atomicStore(&large[LISTED_FROM + atomicAdd(&large[0], 1u)], i);
+}
+
+// Lists an instance as one with a rectangle that is more than the loops for large ones can take.
+fn list_huge(i: u32) {
+    atomicStore(&large[arrayLength(&large) - 1u - atomicAdd(&large[1], 1u)], i);
 }
 
 fn write_counts(i: u32, found: PixelCounts) {
@@ -272,8 +277,11 @@ fn key_of(i: u32) -> u32 {
     } else if own.is_open {
         let pixels = (own.rectangle.z - own.rectangle.x + 1u)
             * (own.rectangle.w - own.rectangle.y + 1u);
-        let is_huge = pixels / PIXELS_OF_ITERATION >= counting.iterations;
-        list_large(i | select(0u, IS_HUGE, is_huge));
+        if pixels / PIXELS_OF_ITERATION >= counting.iterations {
+            list_huge(i);
+        } else {
+            list_large(i);
+        }
     }
     return key;
 }
@@ -375,10 +383,14 @@ fn count_of_pixels_by_few(
 ) {
     count_by(FEW, group.x, lane);
     storageBarrier();
-    // A workgroup for each of the large rectangles that were listed so far.
-    let number = atomicLoad(&large[0]);
-    let rows = (number + TEAMS_PER_ROW - 1u) / TEAMS_PER_ROW;
-    atomicMax(&teams[0], min(number, TEAMS_PER_ROW));
-    atomicMax(&teams[1], rows);
-    atomicMax(&teams[2], 1u);
+    // A workgroup for each of those that were listed so far.
+    ask_for_teams(0u, atomicLoad(&large[0]));
+    ask_for_teams(3u, atomicLoad(&large[1]));
+}
+
+// Asks for so many workgroups at least; their arguments begin at `first`.
+fn ask_for_teams(first: u32, number: u32) {
+    atomicMax(&teams[first], min(number, TEAMS_PER_ROW));
+    atomicMax(&teams[first + 1u], (number + TEAMS_PER_ROW - 1u) / TEAMS_PER_ROW);
+    atomicMax(&teams[first + 2u], 1u);
 }

@@ -36,7 +36,6 @@ const ROW_SHIFT: u32 = 16u;
 const COLUMN_MASK: u32 = (1u << ROW_SHIFT) - 1u;
 
 var<workgroup> large_here: u32;
-var<workgroup> entry_here: u32;
 var<workgroup> rectangle: vec4<u32>;
 // The texels that are left to enter, of one level after the other from the finest one on.
 var<workgroup> lists: array<u32, LISTED * LISTS>;
@@ -230,7 +229,7 @@ fn count_together(
 fn count_large(team: u32, is_huge: bool, group: u32, groups: u32, lane: u32) {
     begin();
     if lane == 0u {
-        large_here = atomicLoad(&large[0]);
+        large_here = atomicLoad(&large[select(0u, 1u, is_huge)]);
         listed_here = 0u;
         atomicStore(&listed, 0u);
     }
@@ -240,13 +239,8 @@ fn count_large(team: u32, is_huge: bool, group: u32, groups: u32, lane: u32) {
     }
     var k = group;
     loop {
-        if lane == 0u {
-            entry_here = atomicLoad(&large[1u + k]);
-        }
-        let entry = workgroupUniformLoad(&entry_here);
-        if ((entry & IS_HUGE) != 0u) == is_huge {
-            count_one(entry & ~IS_HUGE, team, lane);
-        }
+        let place = select(LISTED_FROM + k, arrayLength(&large) - 1u - k, is_huge);
+        count_one(atomicLoad(&large[place]), team, lane);
         k += groups;
         continuing {
             break if k >= count;

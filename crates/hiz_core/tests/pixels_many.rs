@@ -235,9 +235,12 @@ fn planted_faults_turn_it_red() {
     for (name, fault) in [
         (
             "a workgroup for four",
-            ("atomicMax(&teams[0], min(number,", "atomicMax(&teams[0], min(4u,"),
+            ("atomicMax(&teams[first], min(number,", "atomicMax(&teams[first], min(4u,"),
         ),
-        ("no workgroup for the last", ("let number = atomicLoad(&large[0]);", "let number = 1u;")),
+        (
+            "no workgroup for the last",
+            ("ask_for_teams(0u, atomicLoad(&large[0]));", "ask_for_teams(0u, 1u);"),
+        ),
     ] {
         let wrong = noise.wrong(&planted(&[fault]), &large, &PyramidOptions::default());
         assert!(wrong > 0, "{name}: stayed green");

@@ -235,7 +235,7 @@ fn bind_counted(
 fn bind_teams(gpu: &Gpu, output: &PieceOutput) -> Result<Teams> {
     let teams = made(&output.teams, || {
         let usage = STORAGE | wgpu::BufferUsages::INDIRECT;
-        let arguments = gpu.empty("hiz.visible.teams", ARGUMENT_BYTES, usage)?;
+        let arguments = gpu.empty("hiz.visible.teams", 2 * ARGUMENT_BYTES, usage)?;
         let layout = gpu.layout(TEAMS_LAYOUT, TEAM_BINDINGS)?;
         let whole = [entry(0, arguments.as_entire_binding())];
         let bound = gpu.bind_group("hiz.pixels.teams", &layout, &whole)?;
@@ -259,7 +259,7 @@ pub(crate) struct PixelPass {
 struct CountedPiece {
     records: wgpu::BindGroup,
     written: wgpu::BindGroup,
-    /// The list of large rectangles, whose first word is their number.
+    /// The list of large rectangles, which begins with the numbers of large and huge ones.
     large: wgpu::Buffer,
     /// Of the pipeline for all instances.
     workgroups: u32,
@@ -327,7 +327,7 @@ impl PixelPass {
     ) {
         self.view.record(encoder, pyramid);
         for piece in &self.pieces {
-            encoder.clear_buffer(&piece.large, 0, Some(4));
+            encoder.clear_buffer(&piece.large, 0, Some(8));
             if let Teams::Each { arguments, .. } = &piece.teams {
                 encoder.clear_buffer(arguments, 0, None);
             }
@@ -343,7 +343,7 @@ impl PixelPass {
             }
             pass.dispatch_workgroups(piece.workgroups, 1, 1);
         }
-        for pipeline in &self.of_large {
+        for (number, pipeline) in (0..).zip(&self.of_large) {
             pass.set_pipeline(pipeline);
             for piece in &self.pieces {
                 pass.set_bind_group(1, &piece.records, &[]);
@@ -351,7 +351,7 @@ impl PixelPass {
                 match &piece.teams {
                     Teams::Shared(teams) => pass.dispatch_workgroups(*teams, 1, 1),
                     Teams::Each { arguments, .. } => {
-                        pass.dispatch_workgroups_indirect(arguments, 0);
+                        pass.dispatch_workgroups_indirect(arguments, number * ARGUMENT_BYTES);
                     }
                 }
             }

@@ -29,7 +29,7 @@ pub(crate) struct PieceOutput {
     pub(crate) mask: wgpu::Buffer,
     /// The counts of pixels, in the caller's order, if they were asked for.
     pub(crate) pixels: Option<wgpu::Buffer>,
-    /// Beside them, for their passes: which instances have large rectangles, behind their number.
+    /// Beside them, for their passes: which instances have large rectangles, behind two numbers.
     pub(crate) large: Option<wgpu::Buffer>,
     /// The arguments of the dispatch for these, and what binds them, where each has a workgroup.
     pub(crate) teams: OnceLock<(wgpu::Buffer, wgpu::BindGroup)>,
@@ -310,7 +310,7 @@ impl PieceOutput {
         let size = (early_offset(piece, outputs.verdicts) + tail).max(32);
         let counts = u64::from(piece.count().max(1)) * size_of::<PixelCounts>() as u64;
         let pixels = || gpu.empty("hiz.visible.pixels", counts, STORAGE);
-        let words = 4 * (1 + u64::from(piece.count()));
+        let words = 4 * (2 + u64::from(piece.count()));
         let large = || gpu.empty("hiz.visible.large", words, STORAGE);
         Ok(Self {
             mask: gpu.empty("hiz.visible.mask", size, STORAGE)?,
