@@ -38,11 +38,17 @@ const CLASSES: u32 = 40u;
 // Loops over planes at each pixel are of 16 rounds at most, which Mesa unrolls.
 const AROUND_SMALL: u32 = 64u;
 
-// How many large rectangles there are in a row of the dispatch that counts them on a processor.
+// How many workgroups there are in a row of the dispatches of large rectangles on a processor.
 const TEAMS_PER_ROW: u32 = 4096u;
 // What counts a large rectangle looks at so many pixels or more in an iteration of its loops.
 // Twin: `PIXELS_OF_ITERATION` in `crates/hiz_core/src/cull/pixels.rs`, which has the proof.
 const PIXELS_OF_ITERATION: u32 = 64u;
+// So many of them are counted by one workgroup, at most, if there are many.
+// Each may take its share of the iterations.
+// Twin: `LARGE_OF_TEAM` there.
+const LARGE_OF_TEAM: u32 = 4u;
+// From so many workgroups on.
+const FEW_TEAMS: u32 = 32u;
 
 // True: set the bit of each instance that may show in more than a negligible number of pixels.
 override SHOWN: bool;
@@ -277,7 +283,7 @@ fn key_of(i: u32) -> u32 {
     } else if own.is_open {
         let pixels = (own.rectangle.z - own.rectangle.x + 1u)
             * (own.rectangle.w - own.rectangle.y + 1u);
-        if pixels / PIXELS_OF_ITERATION >= counting.iterations {
+        if pixels / PIXELS_OF_ITERATION >= counting.iterations / LARGE_OF_TEAM {
             list_huge(i);
         } else {
             list_large(i);
@@ -347,25 +353,28 @@ fn count_by(invocations: u32, group: u32, lane: u32) {
     t = begin + lane;
     var iterations = counting.iterations;
     loop {
-        if t - lane < small_count {
-            // All of them take as long as the longest one, which is of the class of the first.
-            // It touches its rows in one loop, and looks at them in another.
-            let longest = keys[small[t - lane] - ordered * group] >> CLASS_SHIFT;
-            let needed = 2u * most_rows(longest) + AROUND_SMALL;
-            let is_enough = needed <= iterations;
-            iterations -= min(needed, iterations);
-            if t < small_count {
-                if is_enough {
-                    count_alone(small[t]);
-                } else {
-                    list_large(small[t]);
-                }
-            }
+        // All of them take as long as the longest one, which is of the class of the first.
+        // It touches its rows in one loop, and looks at them in another.
+        let longest = keys[small[t - lane] - ordered * group] >> CLASS_SHIFT;
+        let needed = 2u * most_rows(longest) + AROUND_SMALL;
+        if t - lane >= small_count || needed > iterations {
+            break;
+        }
+        iterations -= needed;
+        if t < small_count {
+            count_alone(small[t]);
         }
         t -= invocations;
         continuing {
             break if t >= begin + invocations;
         }
+    }
+    // A loop of its own, because lavapipe skips no branch.
+    while t < begin + invocations {
+        if t < small_count {
+            list_large(small[t]);
+        }
+        t -= invocations;
     }
 }
 
@@ -383,8 +392,9 @@ fn count_of_pixels_by_few(
 ) {
     count_by(FEW, group.x, lane);
     storageBarrier();
-    // A workgroup for each of those that were listed so far.
-    ask_for_teams(0u, atomicLoad(&large[0]));
+    // Workgroups for those that were listed so far.
+    let number = atomicLoad(&large[0]);
+    ask_for_teams(0u, max((number + LARGE_OF_TEAM - 1u) / LARGE_OF_TEAM, min(number, FEW_TEAMS)));
     ask_for_teams(3u, atomicLoad(&large[1]));
 }
 

@@ -91,13 +91,13 @@ fn look_at_block(
 
 // Counts a rectangle, together with the other invocations, of which there are `team`.
 //
-// What the loops may take ends it like the budget of the instance.
+// The end of `most` iterations of its loops ends it like that of the instance's budget.
 fn count_together(
-    planes: ptr<function, PixelPlanes>, r: vec4<u32>, team: u32, lane: u32,
+    planes: ptr<function, PixelPlanes>, r: vec4<u32>, most: u32, team: u32, lane: u32,
 ) -> Walk {
     var walk = Walk(0u, 0u, 0u, 0u);
     var left = counting.budget;
-    var iterations = counting.iterations;
+    var iterations = most;
     let base = max(pyramid.first_stored, STEP);
     // The level to begin with: the finest one with few texels.
     var top = 0u;
@@ -115,8 +115,8 @@ fn count_together(
     if top == 0u {
         // No level is stored.
         let high = (r.w >> STEP) - (r.y >> STEP) + 1u;
-        let most = select(iterations * team, width * high, width * high / team < iterations);
-        let blocks = min(most, left / CHILD_ROWS);
+        let all = select(iterations * team, width * high, width * high / team < iterations);
+        let blocks = min(all, left / CHILD_ROWS);
         var t = lane;
         loop {
             if t < blocks {
@@ -237,10 +237,11 @@ fn count_large(team: u32, is_huge: bool, group: u32, groups: u32, lane: u32) {
     if group >= count {
         return;
     }
+    let most = select(counting.iterations / LARGE_OF_TEAM, counting.iterations, is_huge);
     var k = group;
     loop {
         let place = select(LISTED_FROM + k, arrayLength(&large) - 1u - k, is_huge);
-        count_one(atomicLoad(&large[place]), team, lane);
+        count_one(atomicLoad(&large[place]), most, team, lane);
         k += groups;
         continuing {
             break if k >= count;
@@ -248,15 +249,15 @@ fn count_large(team: u32, is_huge: bool, group: u32, groups: u32, lane: u32) {
     }
 }
 
-// Counts a large rectangle.
-fn count_one(i: u32, team: u32, lane: u32) {
+// Counts a large rectangle, by at most so many iterations.
+fn count_one(i: u32, most: u32, team: u32, lane: u32) {
     var planes: PixelPlanes;
     let prepared = prepare(i, &planes);
     if lane == 0u {
         rectangle = prepared.rectangle;
     }
     let r = workgroupUniformLoad(&rectangle);
-    let walk = count_together(&planes, r, team, lane);
+    let walk = count_together(&planes, r, most, team, lane);
     parts[lane] = vec4<u32>(walk.touched, walk.hidden, walk.open, walk.done);
     workgroupBarrier();
     if lane == 0u {

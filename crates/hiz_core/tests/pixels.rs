@@ -280,8 +280,8 @@ fn others_change_no_count() {
     for (name, fault) in [
         ("places in a class left out", (" + (key & PLACE_MASK)] =", "] =")),
         (
-            "what comes second left out",
-            ("break if t >= begin + invocations;", "break if t >= view.runtime_zero;"),
+            "the first ones in place of later ones",
+            ("count_alone(small[t]);", "count_alone(small[lane]);"),
         ),
     ] {
         let engine = Engine::with_planted_faults(None, &[fault]).expect("a Vulkan driver");

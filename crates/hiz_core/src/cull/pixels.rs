@@ -43,17 +43,23 @@ pub(crate) const TEAM: u32 = 8;
 #[cfg(test)]
 pub(crate) const LARGE_TEAM: u32 = 64;
 
-/// The loops of [`TEAM`] invocations look at all of a rectangle of fewer than so many pixels for each
-/// iteration that they may take, in a pyramid of all levels.
+/// In a pyramid of all levels the loops of [`TEAM`] invocations look at all of a rectangle of fewer
+/// pixels than this times the iterations that they may take.
 ///
 /// They take an iteration for 8 blocks of 4x4 pixels, which makes n / 8 for n blocks.
 /// Before that come rounds, each of [`TEAM`] + 3 iterations for up to 256 texels.
 /// A round enters 16 texels, or the rest of those that a round one level coarser has listed.
-/// So there are at most n / 256 rounds that list blocks, and one more for each of those before them;
+/// So there are at most n / 256 rounds that list blocks, and one more for each round before them;
 /// over all levels that is less than 1.2 n / 256.
-/// With 1 in 16 pixels, and 9,000 more at the edges of one that is as long as an image's side, n is
-/// less than 267,000: 33,400 iterations for blocks, and 13,800 for rounds.
+/// For a share of 16,127 iterations n is at most 64,500, and 8,500 more at the edges of one that is
+/// as long as an image's side: 9,200 iterations for blocks, and 3,800 for rounds.
+///
+/// Where less is left a round ends the count, so the bound is about completeness alone.
 pub(crate) const PIXELS_OF_ITERATION: u32 = 64;
+
+/// Large rectangles of one workgroup on a processor, each of which may take its share of the
+/// iterations; `shaders/cull/pixels.wgsl`.
+pub(crate) const LARGE_OF_TEAM: u32 = 4;
 
 /// Lavapipe ends all loops of a shader's invocation after so many iterations of them together, and
 /// says nothing.
@@ -61,8 +67,8 @@ pub(crate) const PIXELS_OF_ITERATION: u32 = 64;
 /// (Mesa, `LP_MAX_TGSI_LOOP_ITERATIONS`).
 const MOST_ITERATIONS: u32 = 65_535;
 
-/// What the loops may take that are not summed up, at most: those over the instances of a workgroup,
-/// over classes of sizes, over levels and over planes.
+/// What the loops may take that are not summed up, at most: those over the instances of a
+/// workgroup, over classes of sizes, over levels and over planes.
 /// `count_of_pixels_by_few` has most: 65 rounds for keys, of up to 4 more each, as many for places
 /// and for counts, and 50 for the classes.
 const OTHER_ITERATIONS: u32 = 1024;
@@ -90,7 +96,7 @@ fn ordered(gpu: &Gpu, count: u32) -> u32 {
 
 /// Workgroups of a graphics card that share the large rectangles out among them, at most.
 ///
-/// On a processor each rectangle has its own, so that its loops end with it.
+/// On a processor there is one for few of them, so that its loops end with these.
 const MOST_TEAMS: u32 = 1024;
 
 /// What a count writes: the counts, the mask of what is not negligible, and the list of large
@@ -176,7 +182,7 @@ fn entry_points(gpu: &Gpu, pixels: u64) -> (&'static str, &'static [&'static str
     let of_large: &[_] = &["count_of_many_pixels", "count_of_most_pixels"];
     if !gpu.is_processor() {
         ("count_of_pixels", &of_large[..1])
-    } else if pixels / u64::from(PIXELS_OF_ITERATION) < u64::from(iterations(gpu)) {
+    } else if pixels / u64::from(PIXELS_OF_ITERATION) < u64::from(iterations(gpu) / LARGE_OF_TEAM) {
         (BY_FEW, &of_large[..1])
     } else {
         (BY_FEW, of_large)
@@ -271,7 +277,7 @@ struct CountedPiece {
 enum Teams {
     /// So many.
     Shared(u32),
-    /// One for each, which the count of all instances writes into these arguments.
+    /// As many as the count of all instances writes into these arguments.
     Each { arguments: wgpu::Buffer, bound: wgpu::BindGroup },
 }
 

@@ -99,6 +99,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/outcome", "AT_FRONT", stage(Stage::Front)),
         ("cull/pixels", "WORKGROUP", int(pixels::WORKGROUP)),
         ("cull/pixels", "FEW", int(pixels::FEW)),
+        ("cull/pixels", "LARGE_OF_TEAM", int(pixels::LARGE_OF_TEAM)),
         ("cull/pixels", "MOST_ORDERED", int(pixels::MOST_ORDERED)),
         ("cull/pixels", "PIXELS_OF_ITERATION", int(pixels::PIXELS_OF_ITERATION)),
         ("cull/pixels_large", "TEAM", int(pixels::TEAM)),
