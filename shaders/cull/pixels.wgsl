@@ -42,11 +42,11 @@ const AROUND_SMALL: u32 = 64u;
 const TEAMS_PER_ROW: u32 = 4096u;
 // What counts a large rectangle looks at so many pixels or more in an iteration of its loops.
 // Twin: `PIXELS_OF_ITERATION` in `crates/hiz_core/src/cull/pixels.rs`, which has the proof.
-const PIXELS_OF_ITERATION: u32 = 64u;
+const PIXELS_OF_ITERATION: u32 = 80u;
 // So many of them are counted by one workgroup, at most, if there are many.
 // Each may take its share of the iterations.
 // Twin: `LARGE_OF_TEAM` there.
-const LARGE_OF_TEAM: u32 = 4u;
+const LARGE_OF_TEAM: u32 = 2u;
 // From so many workgroups on.
 const FEW_TEAMS: u32 = 32u;
 
@@ -348,33 +348,35 @@ fn count_by(invocations: u32, group: u32, lane: u32) {
         }
     }
     workgroupBarrier();
-    // The smallest ones come first, so that what is left for others is the largest.
-    let begin = (max(small_count, 1u) - 1u) / invocations * invocations;
-    t = begin + lane;
-    var iterations = counting.iterations;
+    // Which of them the loops can take: from the smallest ones on, so that others get the largest.
+    let last_round = (max(small_count, 1u) - 1u) / invocations * invocations;
+    var first = last_round + invocations;
+    var left = counting.iterations;
+    var round = last_round;
     loop {
-        // All of them take as long as the longest one, which is of the class of the first.
+        // All of a round take as long as the longest one, which is of the class of the first.
         // It touches its rows in one loop, and looks at them in another.
-        let longest = keys[small[t - lane] - ordered * group] >> CLASS_SHIFT;
+        let longest = keys[small[round] - ordered * group] >> CLASS_SHIFT;
         let needed = 2u * most_rows(longest) + AROUND_SMALL;
-        if t - lane >= small_count || needed > iterations {
-            break;
+        first = select(first, round, needed <= left);
+        left -= min(needed, left);
+        round -= invocations;
+        continuing {
+            break if round > last_round;
         }
-        iterations -= needed;
+    }
+    t = first + lane;
+    loop {
         if t < small_count {
             count_alone(small[t]);
         }
-        t -= invocations;
+        t += invocations;
         continuing {
-            break if t >= begin + invocations;
+            break if t >= small_count;
         }
     }
-    // A loop of its own, because lavapipe skips no branch.
-    while t < begin + invocations {
-        if t < small_count {
-            list_large(small[t]);
-        }
-        t -= invocations;
+    for (t = lane; t < min(first, small_count); t += invocations) {
+        list_large(small[t]);
     }
 }
 

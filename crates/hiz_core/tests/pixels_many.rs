@@ -183,7 +183,7 @@ fn what_loops_cannot_take_is_undecided() {
     let mut undecided = Vec::new();
     for most in ["min(counting.iterations, 20u)", "min(counting.iterations, 1000u)"] {
         let engine = planted(&[
-            ("var iterations = counting.iterations;", &format!("var iterations = {most};")),
+            ("var left = counting.iterations;", &format!("var left = {most};")),
             ("var iterations = most;", &format!("var iterations = {most};")),
         ]);
         for levels in [1, 2, 5, 7].map(StoredLevels::from).into_iter().chain([NO_COARSE_LEVEL]) {
@@ -230,8 +230,7 @@ fn planted_faults_turn_it_red() {
     }
     let noise = Noise::new(1280, 720);
     let medium = noise.anywhere(&[[60, 60]], 6000);
-    let engine =
-        planted(&[("t - lane >= small_count || needed > iterations", "t - lane >= small_count")]);
+    let engine = planted(&[("first = select(first, round, needed <= left);", "first = round;")]);
     let wrong = noise.wrong(&engine, &medium, &PyramidOptions::default());
     assert!(wrong > 0, "all are counted here: stayed green");
     let large = whole(&noise, 256);

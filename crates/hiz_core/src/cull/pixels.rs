@@ -51,15 +51,15 @@ pub(crate) const LARGE_TEAM: u32 = 64;
 /// A round enters 16 texels, or the rest of those that a round one level coarser has listed.
 /// So there are at most n / 256 rounds that list blocks, and one more for each round before them;
 /// over all levels that is less than 1.2 n / 256.
-/// For a share of 16,127 iterations n is at most 64,500, and 8,500 more at the edges of one that is
-/// as long as an image's side: 9,200 iterations for blocks, and 3,800 for rounds.
+/// For a share of 32,255 iterations n is at most 161,300, and 8,500 more at the edges of one that
+/// is as long as an image's side: 21,300 iterations for blocks, and 8,800 for rounds.
 ///
 /// Where less is left a round ends the count, so the bound is about completeness alone.
-pub(crate) const PIXELS_OF_ITERATION: u32 = 64;
+pub(crate) const PIXELS_OF_ITERATION: u32 = 80;
 
 /// Large rectangles of one workgroup on a processor, each of which may take its share of the
 /// iterations; `shaders/cull/pixels.wgsl`.
-pub(crate) const LARGE_OF_TEAM: u32 = 4;
+pub(crate) const LARGE_OF_TEAM: u32 = 2;
 
 /// Lavapipe ends all loops of a shader's invocation after so many iterations of them together, and
 /// says nothing.
@@ -69,8 +69,8 @@ const MOST_ITERATIONS: u32 = 65_535;
 
 /// What the loops may take that are not summed up, at most: those over the instances of a
 /// workgroup, over classes of sizes, over levels and over planes.
-/// `count_of_pixels_by_few` has most: 65 rounds for keys, of up to 4 more each, as many for places
-/// and for counts, and 50 for the classes.
+/// `count_of_pixels_by_few` has most: 65 rounds for keys, of up to 4 more each, as many for places,
+/// for sums, for counts and for what is left, and 50 for the classes.
 const OTHER_ITERATIONS: u32 = 1024;
 
 /// What the loops over rectangles may take.
