@@ -205,11 +205,31 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/early", &["WHOLE_RUN"]),
     (
         "cull/pixels",
-        &["SMALL_ROWS", "CLASSES_LOG2", "CLASSES", "CLASS_SHIFT", "PLACE_MASK", "NO_KEY"],
+        &[
+            "AROUND_SMALL",
+            "FEW_TEAMS",
+            "LISTED_FROM",
+            "TEAMS_PER_ROW",
+            "SMALL_ROWS",
+            "CLASSES_LOG2",
+            "CLASSES",
+            "CLASS_SHIFT",
+            "PLACE_MASK",
+            "NO_KEY",
+        ],
     ),
     (
         "cull/pixels_large",
-        &["STEP", "CHILD_ROWS", "CHUNK", "LISTED", "LISTS", "ROW_SHIFT", "COLUMN_MASK"],
+        &[
+            "AROUND_ROUND",
+            "STEP",
+            "CHILD_ROWS",
+            "CHUNK",
+            "LISTED",
+            "LISTS",
+            "ROW_SHIFT",
+            "COLUMN_MASK",
+        ],
     ),
     ("cull/pixels_look", &["UNKNOWN_BITS"]),
     ("cull/pixels_planes", &["OUTLINE_PLACES", "FACE_PLACES", "NO_PLANE"]),
@@ -223,6 +243,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     (
         "pyramid/receiver_mask",
         &[
+            "MOST_BLOCKS",
             "ERROR_FLOOR",
             "ESTIMATE_MARGIN",
             "INTERVAL_ULPS",
