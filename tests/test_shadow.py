@@ -430,6 +430,25 @@ def test_a_receiver_masks_texels_by_definition(device: hizvk.Device) -> None:
         assert np.mean(np.abs(image - best) < 1e-4) > 0.9
 
 
+def test_a_receiver_over_all_of_a_large_mask_is_in_every_texel(device: hizvk.Device) -> None:
+    """Its blocks are more than lavapipe has iterations for."""
+    camera = perspective((0, 0, 0), (0, 0, -1))
+    light = spot((5, 8, 0), (0, 0, -20), size=4096)
+    depth = np.zeros(SIZE, np.float32)
+    depth[SIZE[0] // 2, SIZE[1] // 2] = 0.1 / 16
+    sides = []
+    for radius in (1.0, 3.0, 4.0, 9.0, 30.0):
+        mask = device.receiver_mask(
+            depth, camera, light, kind="reversed_ndc", filter_radius=radius
+        ).numpy()
+        rows, columns = np.nonzero(mask < 1)
+        # It marks a rectangle as a whole, of texels or of blocks of them.
+        sides.append((np.ptp(rows) + 1, np.ptp(columns) + 1))
+        assert len(rows) == sides[-1][0] * sides[-1][1]
+    assert sides[0][0] < 1024
+    assert sides[-2:] == [(4096, 4096)] * 2
+
+
 def test_an_invalid_pixel_keeps_every_caster_of_a_mask(device: hizvk.Device) -> None:
     camera = perspective((0, 0, 0), (0, 0, -1))
     light = spot((5, 8, 0), (0, 0, -20))

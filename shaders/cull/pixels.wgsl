@@ -6,6 +6,11 @@
 // the pixels of a small rectangle.
 // Large rectangles are listed for the second one, which is in `pixels_large.wgsl`.
 //
+// Lavapipe ends all loops of eight invocations once they have taken MOST_ITERATIONS together
+// (`crates/hiz_core/src/cull/pixels.rs`), and then rectangles would have no counts.
+// So what a workgroup's loops may take is summed up before they take it, and what is too much for
+// them is listed, too.
+//
 // What is used here and defined elsewhere:
 //
 // - `pixels_planes.wgsl`, `pixels_planes_box.wgsl`, `pixels_planes_any.wgsl`: `PixelPlanes`,
@@ -28,6 +33,23 @@ const SMALL_ROWS: u32 = 1023u;
 const CLASSES_LOG2: u32 = 2u;
 const CLASSES: u32 = 40u;
 
+// What the loops of an invocation take for one rectangle beside its rows, at most.
+// These are those of `rectangle_of` and of `fill_planes`: 3, and 16 + 1 + 8 + 1 for a sphere's.
+// Loops over planes at each pixel are of 16 rounds at most, which Mesa unrolls.
+const AROUND_SMALL: u32 = 64u;
+
+// How many workgroups there are in a row of the dispatches of large rectangles on a processor.
+const TEAMS_PER_ROW: u32 = 4096u;
+// What counts a large rectangle looks at so many pixels or more in an iteration of its loops.
+// Twin: `PIXELS_OF_ITERATION` in `crates/hiz_core/src/cull/pixels.rs`, which has the proof.
+const PIXELS_OF_ITERATION: u32 = 80u;
+// So many of them are counted by one workgroup, at most, if there are many.
+// Each may take its share of the iterations.
+// Twin: `LARGE_OF_TEAM` there.
+const LARGE_OF_TEAM: u32 = 2u;
+// From so many workgroups on.
+const FEW_TEAMS: u32 = 32u;
+
 // True: set the bit of each instance that may show in more than a negligible number of pixels.
 override SHOWN: bool;
 
@@ -48,7 +70,8 @@ struct Counting {
     negligible: u32,
     // How many instances a workgroup takes, up to MOST_ORDERED.
     ordered: u32,
-    padding: u32,
+    // How many iterations the loops over rectangles may take.
+    iterations: u32,
 }
 
 @group(1) @binding(0) var<uniform> piece: Piece;
@@ -56,8 +79,12 @@ struct Counting {
 @group(2) @binding(0) var<storage, read_write> counts: array<PixelCounts>;
 @group(2) @binding(1) var<storage, read_write> shown: array<atomic<u32>>;
 @group(2) @binding(2) var<uniform> counting: Counting;
-// How many instances have large rectangles, and which.
+// How many instances have large rectangles, how many huge ones, and which.
+// The huge ones are listed from the end on.
 @group(2) @binding(3) var<storage, read_write> large: array<atomic<u32>>;
+const LISTED_FROM: u32 = 2u;
+// On a processor, the arguments of the dispatches that count large ones, and huge ones.
+@group(3) @binding(0) var<storage, read_write> teams: array<atomic<u32>, 6>;
 
 // Nothing is known about so many pixels.
 fn unknown(pixels: u32) -> PixelCounts {
@@ -159,6 +186,23 @@ fn size_class(rows: u32) -> u32 {
     return CLASSES - 1u - (part + (bit << CLASSES_LOG2));
 }
 
+// The most groups of four that a rectangle of a class meets.
+fn most_rows(class_here: u32) -> u32 {
+    let number = CLASSES - 1u - class_here;
+    let part = number & ((1u << CLASSES_LOG2) - 1u);
+    return ((part + (1u << CLASSES_LOG2) + 1u) << (number >> CLASSES_LOG2)) >> CLASSES_LOG2;
+}
+
+// Lists an instance as one with a large rectangle.
+fn list_large(i: u32) {
+    atomicStore(&large[LISTED_FROM + atomicAdd(&large[0], 1u)], i);
+}
+
+// Lists an instance as one with a rectangle that is more than the loops for large ones can take.
+fn list_huge(i: u32) {
+    atomicStore(&large[arrayLength(&large) - 1u - atomicAdd(&large[1], 1u)], i);
+}
+
 fn write_counts(i: u32, found: PixelCounts) {
     let index = caller_index(i);
     counts[index] = found;
@@ -237,7 +281,13 @@ fn key_of(i: u32) -> u32 {
         let class_here = size_class(rows);
         key = (class_here << CLASS_SHIFT) | atomicAdd(&classes[class_here], 1u);
     } else if own.is_open {
-        atomicStore(&large[1u + atomicAdd(&large[0], 1u)], i);
+        let pixels = (own.rectangle.z - own.rectangle.x + 1u)
+            * (own.rectangle.w - own.rectangle.y + 1u);
+        if pixels / PIXELS_OF_ITERATION >= counting.iterations / LARGE_OF_TEAM {
+            list_huge(i);
+        } else {
+            list_large(i);
+        }
     }
     return key;
 }
@@ -298,7 +348,24 @@ fn count_by(invocations: u32, group: u32, lane: u32) {
         }
     }
     workgroupBarrier();
-    t = lane;
+    // Which of them the loops can take: from the smallest ones on, so that others get the largest.
+    let last_round = (max(small_count, 1u) - 1u) / invocations * invocations;
+    var first = last_round + invocations;
+    var left = counting.iterations;
+    var round = last_round;
+    loop {
+        // All of a round take as long as the longest one, which is of the class of the first.
+        // It touches its rows in one loop, and looks at them in another.
+        let longest = keys[small[round] - ordered * group] >> CLASS_SHIFT;
+        let needed = 2u * most_rows(longest) + AROUND_SMALL;
+        first = select(first, round, needed <= left);
+        left -= min(needed, left);
+        round -= invocations;
+        continuing {
+            break if round > last_round;
+        }
+    }
+    t = first + lane;
     loop {
         if t < small_count {
             count_alone(small[t]);
@@ -307,6 +374,9 @@ fn count_by(invocations: u32, group: u32, lane: u32) {
         continuing {
             break if t >= small_count;
         }
+    }
+    for (t = lane; t < min(first, small_count); t += invocations) {
+        list_large(small[t]);
     }
 }
 
@@ -323,4 +393,16 @@ fn count_of_pixels_by_few(
     @builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32,
 ) {
     count_by(FEW, group.x, lane);
+    storageBarrier();
+    // Workgroups for those that were listed so far.
+    let number = atomicLoad(&large[0]);
+    ask_for_teams(0u, max((number + LARGE_OF_TEAM - 1u) / LARGE_OF_TEAM, min(number, FEW_TEAMS)));
+    ask_for_teams(3u, atomicLoad(&large[1]));
+}
+
+// Asks for so many workgroups at least; their arguments begin at `first`.
+fn ask_for_teams(first: u32, number: u32) {
+    atomicMax(&teams[first], min(number, TEAMS_PER_ROW));
+    atomicMax(&teams[first + 1u], (number + TEAMS_PER_ROW - 1u) / TEAMS_PER_ROW);
+    atomicMax(&teams[first + 2u], 1u);
 }

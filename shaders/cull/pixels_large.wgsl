@@ -13,6 +13,9 @@
 // Invocations of a workgroup, which count one rectangle together.
 // Twin: `TEAM` in `crates/hiz_core/src/cull/pixels.rs`.
 const TEAM: u32 = 8u;
+// Those that count a huge one; they wait for one another, which a processor pays for.
+// Twin: `LARGE_TEAM` there.
+const LARGE_TEAM: u32 = 64u;
 
 // Of coarse levels every other one is read.
 // So the children of a texel are four rows of four.
@@ -25,6 +28,9 @@ const CHUNK: u32 = 64u;
 const LISTED: u32 = VECTOR * CHUNK;
 // A list for each level that is read.
 const LISTS: u32 = MAX_LEVELS / STEP;
+// What the loops of an invocation take in a round beside its rows and blocks, at most: the round
+// itself, and one for either loop.
+const AROUND_ROUND: u32 = 3u;
 // A texel's column and row fit one word: the level is 2 or above, of at most 2^15 pixels.
 const ROW_SHIFT: u32 = 16u;
 const COLUMN_MASK: u32 = (1u << ROW_SHIFT) - 1u;
@@ -37,7 +43,7 @@ var<workgroup> lists: array<u32, LISTED * LISTS>;
 var<workgroup> listed: atomic<u32>;
 var<workgroup> listed_here: u32;
 // What each invocation has counted.
-var<workgroup> parts: array<vec4<u32>, TEAM>;
+var<workgroup> parts: array<vec4<u32>, LARGE_TEAM>;
 
 // A place of a row of four in an area that is `width` of them wide.
 fn place_in(t: u32, width: u32) -> vec2<u32> {
@@ -51,6 +57,15 @@ fn block_of(t: u32, sides_log2: u32) -> vec2<u32> {
     let mask = (1u << sides_log2) - 1u;
     let inner = vec2<u32>(t & mask, (t >> sides_log2) & mask);
     return (vec2<u32>(texel & COLUMN_MASK, texel >> ROW_SHIFT) << vec2<u32>(sides_log2)) + inner;
+}
+
+// Lists texel k of the four at `at`, if its bit is set; returns where the next one goes.
+fn list_texel(bits: u32, k: u32, at: vec2<u32>, place: u32) -> u32 {
+    if (bits & (1u << k)) == 0u {
+        return place;
+    }
+    lists[place] = (at.y << ROW_SHIFT) | (VECTOR * at.x + k);
+    return place + 1u;
 }
 
 // Counts the 4x4 pixels of a block, as far as they are in the rectangle r.
@@ -74,12 +89,15 @@ fn look_at_block(
     look_at_pixels(planes, at_3, depths_3, r, walk);
 }
 
-// Counts a rectangle, together with the other invocations; `budget` is what may be read.
+// Counts a rectangle, together with the other invocations, of which there are `team`.
+//
+// The end of `most` iterations of its loops ends it like that of the instance's budget.
 fn count_together(
-    planes: ptr<function, PixelPlanes>, r: vec4<u32>, budget: u32, lane: u32,
+    planes: ptr<function, PixelPlanes>, r: vec4<u32>, most: u32, team: u32, lane: u32,
 ) -> Walk {
     var walk = Walk(0u, 0u, 0u, 0u);
-    var left = budget;
+    var left = counting.budget;
+    var iterations = most;
     let base = max(pyramid.first_stored, STEP);
     // The level to begin with: the finest one with few texels.
     var top = 0u;
@@ -96,23 +114,39 @@ fn count_together(
     }
     if top == 0u {
         // No level is stored.
-        rows = min(rows, left);
-        for (var t = lane; t < rows; t += TEAM) {
-            let at = corner + place_in(t, width);
-            look_at_pixels(planes, at, read_depths(at), r, &walk);
+        let high = (r.w >> STEP) - (r.y >> STEP) + 1u;
+        let all = select(iterations * team, width * high, width * high / team < iterations);
+        let blocks = min(all, left / CHILD_ROWS);
+        var t = lane;
+        loop {
+            if t < blocks {
+                look_at_block(planes, (r.xy >> vec2<u32>(STEP)) + place_in(t, width), r, &walk);
+            }
+            t += team;
+            continuing {
+                break if t >= blocks;
+            }
         }
         return walk;
     }
 
     // How many texels each list has.
     var counts_of_lists: array<u32, LISTS>;
+    // Which of them have some, a bit for each.
+    var filled = 0u;
     // The list to enter next; LISTS: the first level is next.
     var list = LISTS;
     // How many rows of the first level have been looked at.
     var next = 0u;
     // How many texels had been listed before.
     var before = workgroupUniformLoad(&listed_here);
+    // What the rows of a round take.
+    let of_round = AROUND_ROUND + CHUNK / team;
     loop {
+        if iterations < of_round {
+            left = 0u;
+        }
+        iterations -= min(of_round, iterations);
         let is_top = list == LISTS;
         var level = top;
         var begin = next;
@@ -123,6 +157,7 @@ fn count_together(
             level = base + STEP * (list - 1u);
             let entered = min(counts_of_lists[list], CHUNK / CHILD_ROWS);
             counts_of_lists[list] -= entered;
+            filled &= ~select(0u, 1u << list, counts_of_lists[list] == 0u);
             begin = list * LISTED + counts_of_lists[list];
             chunk = CHILD_ROWS * entered;
         }
@@ -140,14 +175,12 @@ fn count_together(
                 }
                 let bits = look_at_texels(planes, level, at, r, &walk);
                 var place = below * LISTED + atomicAdd(&listed, countOneBits(bits)) - before;
-                for (var k = 0u; k < VECTOR; k += 1u) {
-                    if (bits & (1u << k)) != 0u {
-                        lists[place] = (at.y << ROW_SHIFT) | (VECTOR * at.x + k);
-                        place += 1u;
-                    }
-                }
+                place = list_texel(bits, 0u, at, place);
+                place = list_texel(bits, 1u, at, place);
+                place = list_texel(bits, 2u, at, place);
+                place = list_texel(bits, 3u, at, place);
             }
-            t += TEAM;
+            t += team;
             continuing {
                 break if t >= chunk;
             }
@@ -158,30 +191,31 @@ fn count_together(
         }
         let after = workgroupUniformLoad(&listed_here);
         counts_of_lists[below] = after - before;
+        filled |= select(0u, 1u << below, after > before);
         before = after;
 
         // The pixels of what is open at the finest coarse level.
         let blocks_log2 = base - STEP;
         let reads = CHILD_ROWS << (2u * blocks_log2);
-        let entered = min(counts_of_lists[0], left / reads);
+        let of_texel = max((1u << (2u * blocks_log2)) / team, 1u);
+        let entered = min(counts_of_lists[0], min(left / reads, iterations / of_texel));
         let blocks = entered << (2u * blocks_log2);
+        iterations -= (blocks + team - 1u) / team;
         t = lane;
         loop {
             if t < blocks {
                 look_at_block(planes, block_of(t, blocks_log2), r, &walk);
             }
-            t += TEAM;
+            t += team;
             continuing {
                 break if t >= blocks;
             }
         }
         left = select(left - entered * reads, 0u, entered < counts_of_lists[0]);
         counts_of_lists[0] = 0u;
+        filled &= ~1u;
         // The finest level with texels to enter is next, and at last the first level.
-        list = LISTS;
-        for (var k = LISTS - 1u; k > 0u; k -= 1u) {
-            list = select(list, k, counts_of_lists[k] > 0u);
-        }
+        list = select(LISTS, firstTrailingBit(filled), filled != 0u);
         workgroupBarrier();
         continuing {
             break if left == 0u || (list == LISTS && next == rows);
@@ -190,47 +224,67 @@ fn count_together(
     return walk;
 }
 
+// Counts every `groups`-th large rectangle, from number `group` on, by a workgroup of `team`: the
+// huge ones, or the others.
+fn count_large(team: u32, is_huge: bool, group: u32, groups: u32, lane: u32) {
+    begin();
+    if lane == 0u {
+        large_here = atomicLoad(&large[select(0u, 1u, is_huge)]);
+        listed_here = 0u;
+        atomicStore(&listed, 0u);
+    }
+    let count = workgroupUniformLoad(&large_here);
+    if group >= count {
+        return;
+    }
+    let most = select(counting.iterations / LARGE_OF_TEAM, counting.iterations, is_huge);
+    var k = group;
+    loop {
+        let place = select(LISTED_FROM + k, arrayLength(&large) - 1u - k, is_huge);
+        count_one(atomicLoad(&large[place]), most, team, lane);
+        k += groups;
+        continuing {
+            break if k >= count;
+        }
+    }
+}
+
+// Counts a large rectangle, by at most so many iterations.
+fn count_one(i: u32, most: u32, team: u32, lane: u32) {
+    var planes: PixelPlanes;
+    let prepared = prepare(i, &planes);
+    if lane == 0u {
+        rectangle = prepared.rectangle;
+    }
+    let r = workgroupUniformLoad(&rectangle);
+    let walk = count_together(&planes, r, most, team, lane);
+    parts[lane] = vec4<u32>(walk.touched, walk.hidden, walk.open, walk.done);
+    workgroupBarrier();
+    if lane == 0u {
+        var sum = parts[0];
+        for (var part = 1u; part < team; part += 1u) {
+            sum += parts[part];
+        }
+        var found = prepared.counts;
+        if prepared.is_open {
+            found = counts_of(Walk(sum.x, sum.y, sum.z, sum.w), r);
+        }
+        write_counts(i, found);
+    }
+}
+
 @compute @workgroup_size(TEAM)
 fn count_of_many_pixels(
     @builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    begin();
-    if lane == 0u {
-        large_here = atomicLoad(&large[0]);
-        listed_here = 0u;
-        atomicStore(&listed, 0u);
-    }
-    let count = workgroupUniformLoad(&large_here);
-    if group.x >= count {
-        return;
-    }
-    var k = group.x;
-    loop {
-        let i = atomicLoad(&large[1u + k]);
-        var planes: PixelPlanes;
-        let prepared = prepare(i, &planes);
-        if lane == 0u {
-            rectangle = prepared.rectangle;
-        }
-        let r = workgroupUniformLoad(&rectangle);
-        let walk = count_together(&planes, r, counting.budget, lane);
-        parts[lane] = vec4<u32>(walk.touched, walk.hidden, walk.open, walk.done);
-        workgroupBarrier();
-        if lane == 0u {
-            var sum = parts[0];
-            for (var part = 1u; part < TEAM; part += 1u) {
-                sum += parts[part];
-            }
-            var found = prepared.counts;
-            if prepared.is_open {
-                found = counts_of(Walk(sum.x, sum.y, sum.z, sum.w), r);
-            }
-            write_counts(i, found);
-        }
-        k += groups.x;
-        continuing {
-            break if k >= count;
-        }
-    }
+    count_large(TEAM, false, group.y * groups.x + group.x, groups.x * groups.y, lane);
+}
+
+@compute @workgroup_size(LARGE_TEAM)
+fn count_of_most_pixels(
+    @builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    count_large(LARGE_TEAM, true, group.y * groups.x + group.x, groups.x * groups.y, lane);
 }

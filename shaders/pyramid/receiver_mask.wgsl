@@ -16,6 +16,11 @@ const SIDE: u32 = 8u;
 // Twin: `MASK_BLOCK_LOG2` in `crates/hiz_core/src/pyramid/receiver_mask.rs`.
 const MASK_BLOCK_LOG2: u32 = 4u;
 const WIDEST: i32 = 1 << MASK_BLOCK_LOG2;
+// Receivers in more blocks than this mark all texels.
+// Lavapipe ends all loops of eight invocations once they have taken 65,535 iterations together, and
+// then the blocks behind had no receiver.
+// One loop over all blocks of a receiver takes as many as the one of eight that has most.
+const MOST_BLOCKS: u32 = 1u << 15u;
 
 // Twins: `EPS` and `ERROR_ULPS` in `crates/hiz_core/src/input/view.rs`.
 const EPS: f32 = 0x1p-23;
@@ -232,10 +237,15 @@ fn scatter_receivers(@builtin(global_invocation_id) id: vec3<u32>) {
     let shift = vec2<u32>(MASK_BLOCK_LOG2);
     let block_columns = vec2<u32>(columns) >> shift;
     let block_rows = vec2<u32>(rows) >> shift;
-    for (var row = block_rows.x; row <= block_rows.y; row += 1u) {
-        for (var column = block_columns.x; column <= block_columns.y; column += 1u) {
-            mark(first_block() + row * mask.blocks + column, key);
-        }
+    let width = block_columns.y - block_columns.x + 1u;
+    let blocks = width * (block_rows.y - block_rows.x + 1u);
+    if blocks > MOST_BLOCKS {
+        mark(whole_image(), key);
+        return;
+    }
+    let corner = first_block() + block_rows.x * mask.blocks + block_columns.x;
+    for (var i = 0u; i < blocks; i += 1u) {
+        mark(corner + i / width * mask.blocks + i % width, key);
     }
 }
 

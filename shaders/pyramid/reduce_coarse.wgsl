@@ -10,8 +10,23 @@
 
 // True: a workgroup shares a texel.
 override SHARED: bool;
+// True: each iteration reads two rows of blocks.
+//
+// Lavapipe ends all loops of eight invocations once they have taken 65,535 iterations together, and
+// then the blocks behind would not count.
+// A part of level 14 has 256 rows of 256 blocks, which take 256 * 257 iterations one by one, and
+// 128 * 257 two by two.
+// A part of level 13 takes 128 * 129, and no image of lavapipe has a level 15.
+override BY_TWO_ROWS: bool;
 
 var<workgroup> parts: array<Ends, WORKGROUP>;
+
+// The ends of a block.
+fn ends_of_block(at: vec2<u32>) -> Ends {
+    let rows = source_quads(at);
+    let by_row = in_row(joined4(rows[0]), joined4(rows[1]), joined4(rows[2]), joined4(rows[3]));
+    return joined4(by_row);
+}
 
 // The ends of `side` x `side` blocks.
 fn ends_of(begin: vec2<u32>, side: u32) -> Ends {
@@ -20,12 +35,14 @@ fn ends_of(begin: vec2<u32>, side: u32) -> Ends {
     let blocks = (vec2<u32>(image.width, image.height) + vec2<u32>(BLOCK - 1u)) / BLOCK;
     let end = max(min(begin + vec2<u32>(side), blocks), begin + vec2<u32>(1u));
     var ends = no_ends();
-    for (var y = begin.y; y < end.y; y += 1u) {
+    for (var y = begin.y; y < end.y; y += select(1u, 2u, BY_TWO_ROWS)) {
         for (var x = begin.x; x < end.x; x += 1u) {
-            let rows = source_quads(vec2<u32>(x, y));
-            let by_row =
-                in_row(joined4(rows[0]), joined4(rows[1]), joined4(rows[2]), joined4(rows[3]));
-            ends = joined(ends, joined4(by_row));
+            let block = ends_of_block(vec2<u32>(x, y));
+            ends = joined(ends, block);
+            if BY_TWO_ROWS {
+                let below = ends_of_block(vec2<u32>(x, min(y + 1u, end.y - 1u)));
+                ends = joined(ends, below);
+            }
         }
     }
     return ends;

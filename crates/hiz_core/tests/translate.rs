@@ -49,6 +49,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("REVERSED", FLAG),
     ("SAMPLES", &[2.0, 4.0, 8.0]),
     ("SAMPLE_COVERAGE", FLAG),
+    ("BY_TWO_ROWS", FLAG),
     ("SHARED", FLAG),
     ("SHOWN", FLAG),
     ("SOME", FLAG),

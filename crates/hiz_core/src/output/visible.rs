@@ -29,8 +29,10 @@ pub(crate) struct PieceOutput {
     pub(crate) mask: wgpu::Buffer,
     /// The counts of pixels, in the caller's order, if they were asked for.
     pub(crate) pixels: Option<wgpu::Buffer>,
-    /// Beside them, for their passes: which instances have large rectangles, behind their number.
+    /// Beside them, for their passes: which instances have large rectangles, behind two numbers.
     pub(crate) large: Option<wgpu::Buffer>,
+    /// The arguments of the dispatch for these, and what binds them, where each has a workgroup.
+    pub(crate) teams: OnceLock<(wgpu::Buffer, wgpu::BindGroup)>,
     /// Made by the first cull that tests groups.
     groups: OnceLock<GroupOutput>,
     /// What culls bind, made by the first of each kind.
@@ -308,12 +310,13 @@ impl PieceOutput {
         let size = (early_offset(piece, outputs.verdicts) + tail).max(32);
         let counts = u64::from(piece.count().max(1)) * size_of::<PixelCounts>() as u64;
         let pixels = || gpu.empty("hiz.visible.pixels", counts, STORAGE);
-        let words = 4 * (1 + u64::from(piece.count()));
+        let words = 4 * (2 + u64::from(piece.count()));
         let large = || gpu.empty("hiz.visible.large", words, STORAGE);
         Ok(Self {
             mask: gpu.empty("hiz.visible.mask", size, STORAGE)?,
             pixels: outputs.pixels.then(pixels).transpose()?,
             large: outputs.pixels.then(large).transpose()?,
+            teams: OnceLock::new(),
             groups: OnceLock::new(),
             bindings: Default::default(),
             counted: KeptBindings::new(NEGLIGIBLE_KEPT),
@@ -333,7 +336,8 @@ impl PieceOutput {
     fn size(&self) -> u64 {
         let of_groups = self.groups.get().map_or(0, GroupOutput::size);
         let of_pixels = [&self.pixels, &self.large].into_iter().flatten().map(wgpu::Buffer::size);
-        self.mask.size() + of_groups + of_pixels.sum::<u64>()
+        let of_teams = self.teams.get().map_or(0, |(arguments, _)| arguments.size());
+        self.mask.size() + of_groups + of_pixels.sum::<u64>() + of_teams
     }
 }
 

@@ -44,7 +44,8 @@ enum Shape {
     /// `shaders/pyramid/reduce.wgsl`, `reduce_tail`, which makes all remaining levels.
     Tail,
     /// `shaders/pyramid/reduce_coarse.wgsl`; if `shared`, a whole workgroup makes each texel.
-    Coarse { shared: bool },
+    /// `by_two_rows`: see there.
+    Coarse { shared: bool, by_two_rows: bool },
 }
 
 /// The ends that the reduction makes: one, of farthest depths, or both.
@@ -114,8 +115,8 @@ fn reduce_pipeline(
             constants.extend([("FROM_SOURCE", flag(false)), ("FIRST", 1.0)]);
             (blocks_module(source, ends), "reduce_tail")
         }
-        Shape::Coarse { shared } => {
-            constants.push(("SHARED", flag(shared)));
+        Shape::Coarse { shared, by_two_rows } => {
+            constants.extend([("SHARED", flag(shared)), ("BY_TWO_ROWS", flag(by_two_rows))]);
             (coarse_module(source, ends), "reduce_coarse")
         }
     };
@@ -141,6 +142,9 @@ const PAGE_PIXELS: u32 = 1024;
 /// The finest level whose texels are shared by a workgroup if it is made alone.
 /// Each invocation then reads at least 8x8 pixels.
 pub(crate) const SHARED_LEVEL: u32 = 6;
+/// The finest level that is made of two rows of blocks at a time if it is made alone;
+/// `shaders/pyramid/reduce_coarse.wgsl` says why.
+const TWO_ROWS_LEVEL: u32 = 14;
 
 /// A reduction whose pipelines and bindings are made.
 pub(super) struct Prepared {
@@ -383,9 +387,10 @@ fn shape_of(step: &Step, blocks: [u32; 2], tall: bool) -> (Shape, [u32; 2]) {
         let (from_source, first) = (step.source == 0, step.first - step.source);
         (Shape::Blocks { from_source, first }, of_places)
     } else if step.last < SHARED_LEVEL {
-        (Shape::Coarse { shared: false }, of_places)
+        (Shape::Coarse { shared: false, by_two_rows: false }, of_places)
     } else {
-        (Shape::Coarse { shared: true }, [columns, rows])
+        let by_two_rows = step.last >= TWO_ROWS_LEVEL;
+        (Shape::Coarse { shared: true, by_two_rows }, [columns, rows])
     }
 }
 

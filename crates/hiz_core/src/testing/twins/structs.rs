@@ -110,7 +110,8 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "unoccluded" = unoccluded,
         }),
         twin!("Counting", CountingUniform {
-            "budget" = budget, "negligible" = negligible, "ordered" = ordered, "padding" = padding,
+            "budget" = budget, "negligible" = negligible, "ordered" = ordered,
+            "iterations" = iterations,
         }),
         twin!("DrawIndexedIndirect", DrawIndexedIndirect {
             "index_count" = index_count, "instance_count" = instance_count,
