@@ -7,7 +7,7 @@
 // Large rectangles are listed for the second one, which is in `pixels_large.wgsl`.
 //
 // Lavapipe ends all loops of eight invocations once they have taken MOST_ITERATIONS together
-// (`crates/hiz_core/src/cull/pixels.rs`), and then rectangles would have no counts.
+// (`crates/hiz_core/src/gpu/loops.rs`), and then rectangles would have no counts.
 // So what a workgroup's loops may take is summed up before they take it, and what is too much for
 // them is listed, too.
 //

@@ -1,14 +1,9 @@
 //! How far a descent may go.
 //!
-//! Mesa's llvmpipe ends all loops of an invocation once they have taken 65,535 iterations together
-//! (`LP_MAX_TGSI_LOOP_ITERATIONS` in `lp_bld_limits.h`).
-//! It tells nobody: whatever the loops had left to do is not done, so bits of what is visible may
-//! stay 0.
+//! llvmpipe ends the loops of an invocation after [`MOST_ITERATIONS`] together (`gpu/loops.rs`).
+//! Where it does, instances are not tested, and bits of what is visible stay 0.
 //! So on processors a descent has a budget that ends before.
-//!
-//! The iterations count for the eight invocations of a vector together, if any of them is in the
-//! loop.
-//! So what bounds them is the most that each part of an invocation can take, and not their sum:
+//! What an invocation can take at most:
 //!
 //! | part | iterations at most |
 //! |---|---:|
@@ -17,14 +12,10 @@
 //! | its planes, its level of detail, its place in lists | 128 |
 //! | each texel of a descent | 1, and with planes ROUNDS + 1 |
 //! | each texel of a descent down the nearest end | 1 |
-//!
-//! A loop may take one iteration more than it needs.
 
 use crate::cull::groups::GROUPS_OF_RUN;
 use crate::cull::options::Fit;
-
-/// Iterations of all loops of an invocation, by llvmpipe.
-pub(crate) const MOST_ITERATIONS: u32 = 65_535;
+use crate::gpu::loops::MOST_ITERATIONS;
 
 /// Planes of one round of `surely_clear`, and the most rounds; `shaders/cull/supporting_planes.wgsl`.
 ///

@@ -13,6 +13,7 @@ use crate::gpu::buffers::{STORAGE, check_alive, entry, made};
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::Gpu;
 use crate::gpu::layouts::Binding;
+use crate::gpu::loops::MOST_ITERATIONS;
 use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
@@ -60,12 +61,6 @@ pub(crate) const PIXELS_OF_ITERATION: u32 = 80;
 /// Large rectangles of one workgroup on a processor, each of which may take its share of the
 /// iterations; `shaders/cull/pixels.wgsl`.
 pub(crate) const LARGE_OF_TEAM: u32 = 2;
-
-/// Lavapipe ends all loops of a shader's invocation after so many iterations of them together, and
-/// says nothing.
-/// Eight invocations have one counter, which counts what any of them takes
-/// (Mesa, `LP_MAX_TGSI_LOOP_ITERATIONS`).
-const MOST_ITERATIONS: u32 = 65_535;
 
 /// What the loops may take that are not summed up, at most: those over the instances of a
 /// workgroup, over classes of sizes, over levels and over planes.

@@ -12,6 +12,7 @@ pub(crate) mod depth_source;
 pub(crate) mod device;
 pub(crate) mod kept;
 pub(crate) mod layouts;
+pub(crate) mod loops;
 pub(crate) mod made;
 pub(crate) mod numbers;
 pub(crate) mod pipelines;
