@@ -9,7 +9,7 @@
 // docs/accuracy.md derives this, under "A volume's own outline and front".
 
 //
-// Planes come by fours, which are compared in one round of a loop: the loops of an invocation are
+// A round of the loop over planes compares four of them, because the loops of an invocation are
 // limited (`crates/hiz_core/src/cull/descent.rs`).
 
 // Planes of one round, and the rounds of all of them.
@@ -19,28 +19,26 @@ const MOST_ROUNDS: u32 = 6u;
 const ROUNDS: u32 = (CANDIDATES + PLANES_OF_ROUND - 1u) / PLANES_OF_ROUND;
 const_assert ROUNDS <= MOST_ROUNDS;
 
-struct FourPlanes {
+struct SupportingPlane {
     // Depth units per pixel; of an outline, pixels per pixel.
-    slope_x: vec4<f32>,
-    slope_y: vec4<f32>,
+    slope: vec2<f32>,
     // 1, or -1 with reversed Z: the plane bounds the depth of a front face.
     // 0: it bounds the outline.
-    facing: vec4<f32>,
-    offset: vec4<f32>,
+    facing: f32,
+    offset: f32,
 }
 
 struct SupportingPlanes {
     // The rectangle around the volume, to fractions of a pixel.
     left_top: vec2<f32>,
     right_bottom: vec2<f32>,
-    list: array<FourPlanes, ROUNDS>,
+    // The rest of the last round is NOTHING_BEYOND.
+    list: array<SupportingPlane, PLANES_OF_ROUND * ROUNDS>,
     count: u32,
 }
 
-// Planes beyond which nothing lies.
-fn no_planes() -> FourPlanes {
-    return FourPlanes(vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(-1.0));
-}
+// A plane beyond which nothing lies.
+const NOTHING_BEYOND: SupportingPlane = SupportingPlane(vec2<f32>(0.0), 0.0, -1.0);
 
 // A volume on the four rows.
 struct Projected {
@@ -146,18 +144,31 @@ fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
         let offset = bar(least - GUESS_ERRORS * error_bound(r, least, p.w) / p.w_min);
         let small = is_small(bitcast<u32>(offset)) && error_bound(r, offset, p.w) < LARGEST_ERROR;
         if small && surely_above(r, offset, p.w) {
-            let round = (*planes).count / PLANES_OF_ROUND;
-            let k = (*planes).count % PLANES_OF_ROUND;
-            if k == 0u {
-                (*planes).list[round] = no_planes();
-            }
-            (*planes).list[round].slope_x[k] = slope.x;
-            (*planes).list[round].slope_y[k] = slope.y;
-            (*planes).list[round].facing[k] = guess.facing;
-            (*planes).list[round].offset[k] = offset;
+            (*planes).list[(*planes).count] = SupportingPlane(slope, guess.facing, offset);
             (*planes).count += 1u;
         }
     }
+    // One of the last three is behind the list only if the last round is full.
+    let last = PLANES_OF_ROUND * ROUNDS - 1u;
+    let count = (*planes).count;
+    if count <= last {
+        (*planes).list[count] = NOTHING_BEYOND;
+        (*planes).list[min(count + 1u, last)] = NOTHING_BEYOND;
+        (*planes).list[min(count + 2u, last)] = NOTHING_BEYOND;
+    }
+}
+
+// Whether all between the corners lies beyond a plane, or is farther than the depth there.
+fn is_beyond(
+    plane: SupportingPlane, left_top: vec2<f32>, right_bottom: vec2<f32>, depth: f32,
+) -> bool {
+    // At this corner the plane is nearest, or reaches farthest out.
+    let corner = select(left_top, right_bottom, plane.slope > vec2<f32>(0.0));
+    let fall = plane.slope * corner;
+    let bound = plane.facing * depth;
+    let magnitudes = abs(plane.offset) + abs(fall.x) + abs(fall.y) + abs(bound);
+    let margin = TEXEL_ULPS * EPS * magnitudes + TEXEL_FLOOR;
+    return plane.offset - fall.x - fall.y - margin > bound;
 }
 
 // True implies: no pixel from `begin` to before `end` shows anything of the volume, if its depth is
@@ -170,19 +181,11 @@ fn surely_clear(
     let right_bottom = min(vec2<f32>(end) + view.reach - view.half_size, (*planes).right_bottom);
     // It may be the far plane, too, since anything farther is outside the view volume.
     let depth = bar(occluding_depth(bits) - view.z_slope);
-    for (var i = 0u; PLANES_OF_ROUND * i < (*planes).count; i += 1u) {
-        let plane = (*planes).list[i];
-        // At this corner the plane is nearest, or reaches farthest out.
-        let is_right = plane.slope_x > vec4<f32>(0.0);
-        let is_below = plane.slope_y > vec4<f32>(0.0);
-        let corner_x = select(vec4<f32>(left_top.x), vec4<f32>(right_bottom.x), is_right);
-        let corner_y = select(vec4<f32>(left_top.y), vec4<f32>(right_bottom.y), is_below);
-        let fall_x = plane.slope_x * corner_x;
-        let fall_y = plane.slope_y * corner_y;
-        let bound = plane.facing * depth;
-        let magnitudes = abs(plane.offset) + abs(fall_x) + abs(fall_y) + abs(bound);
-        let margin = TEXEL_ULPS * EPS * magnitudes + TEXEL_FLOOR;
-        if any(plane.offset - fall_x - fall_y - margin > bound) {
+    for (var i = 0u; i < (*planes).count; i += PLANES_OF_ROUND) {
+        if is_beyond((*planes).list[i], left_top, right_bottom, depth)
+            | is_beyond((*planes).list[i + 1u], left_top, right_bottom, depth)
+            | is_beyond((*planes).list[i + 2u], left_top, right_bottom, depth)
+            | is_beyond((*planes).list[i + 3u], left_top, right_bottom, depth) {
             return true;
         }
     }

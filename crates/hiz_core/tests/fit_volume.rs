@@ -114,16 +114,10 @@ fn planted_faults_turn_it_red() {
         ),
         (
             "the texel's nearest corner",
-            &[
-                (
-                    "select(vec4<f32>(left_top.x), vec4<f32>(right_bottom.x), is_right)",
-                    "select(vec4<f32>(right_bottom.x), vec4<f32>(left_top.x), is_right)",
-                ),
-                (
-                    "select(vec4<f32>(left_top.y), vec4<f32>(right_bottom.y), is_below)",
-                    "select(vec4<f32>(right_bottom.y), vec4<f32>(left_top.y), is_below)",
-                ),
-            ],
+            &[(
+                "select(left_top, right_bottom, plane.slope >",
+                "select(right_bottom, left_top, plane.slope >",
+            )],
         ),
         ("a pixel too few", &[("min(end, last + vec2<u32>(1u)), bits)", "min(end, last), bits)")]),
         (

@@ -158,10 +158,10 @@ const MORE_FAULTS: &[Fault] = &[
             ("select(-BEYOND, low, surely_above(r, low, w))", "low"),
         ],
     ),
-    ("a column's fall alone", &[("plane.offset - fall_x - fall_y", "plane.offset - fall_x")]),
+    ("a column's fall alone", &[("plane.offset - fall.x - fall.y", "plane.offset - fall.x")]),
     (
         "an offset of 0 for edges",
-        &[("offset[k] = offset;", "offset[k] = abs(guess.facing) * offset;")],
+        &[("slope, guess.facing, offset)", "slope, guess.facing, abs(guess.facing) * offset)")],
     ),
     (
         "a texel's first pixel alone",
@@ -173,13 +173,14 @@ const MORE_FAULTS: &[Fault] = &[
     (
         "another plane's offset",
         &[(
-            "let plane = (*planes).list[i];",
-            "var plane = (*planes).list[i]; plane.offset = vec4<f32>((*planes).list[0].offset.x);",
+            "SupportingPlane(slope, guess.facing, offset);",
+            "SupportingPlane(slope, guess.facing, offset); if (*planes).count > 0u { \
+             (*planes).list[(*planes).count].offset = (*planes).list[0].offset; }",
         )],
     ),
     (
         "one side for both axes",
-        &[("let is_below = plane.slope_y > vec4<f32>(0.0);", "let is_below = is_right;")],
+        &[("plane.slope > vec2<f32>(0.0)", "vec2<bool>(plane.slope.x > 0.0)")],
     ),
     (
         "no certificate, no margin",

@@ -269,6 +269,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "TEXEL_ULPS",
             "TEXEL_FLOOR",
             "ROUNDS",
+            "NOTHING_BEYOND",
         ],
     ),
     (
