@@ -25,7 +25,7 @@ class StageTime:
     ``"cull members"``, ``"cull"`` (without groups), ``"list"``, ``"join"`` (of views), ``"among"``,
     ``"update"`` or ``"refine"``.
 
-    The host's rasteriser has no stage, nor has a reduction that copies the levels which it has made:
+    The host's rasteriser has no stage, nor has a reduction that copies the levels which it made:
     their time is the host's own."""
     passes: int
     """How many passes it had."""
