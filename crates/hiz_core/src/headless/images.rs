@@ -16,7 +16,8 @@ use crate::occluders::drawing::Rasteriser;
 
 /// Pixels of all kept images at most: one of 4K, or four of 1080p.
 ///
-/// A pixel takes 8 bytes on the device and about 6 on the host.
+/// A pixel takes 8 bytes on the device, up to 3 more where the host makes levels, and about 6 on
+/// the host.
 const MOST_PIXELS: u64 = 1 << 23;
 
 /// The images of an engine that may be lent again, with the rasteriser that was asked for.
