@@ -41,7 +41,7 @@ impl HizContext {
         size: ImageSize,
         rasteriser: Rasteriser,
     ) -> Result<OccluderDepth> {
-        OccluderDepth::new(&self.gpu, size, rasteriser)
+        OccluderDepth::new(&self.gpu, size, rasteriser, false)
     }
 
     /// Records the drawing of `occluders` into `depth`, which [`record_reduce`](Self::record_reduce)

@@ -3,6 +3,8 @@
 //! Here each option goes one of two ways.
 //! A number goes into the view uniform, and a choice into the key of the pipelines.
 
+use std::sync::Arc;
+
 use crate::cull::among::Among;
 use crate::cull::descent::most_on_processors;
 use crate::cull::groups::group_descent;
@@ -13,6 +15,7 @@ use crate::cull::view_uniform::{ViewUniform, packed};
 use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
 use crate::gpu::device::Gpu;
+use crate::gpu::kept::Lent;
 use crate::gpu::numbers::Numbers;
 use crate::gpu::recorded_uniform::BoundParts;
 use crate::input::camera::Camera;
@@ -88,6 +91,8 @@ pub(super) struct BoundView {
     pub(super) instances: wgpu::BindGroup,
     pub(super) groups: Option<wgpu::BindGroup>,
     numbers: Option<Numbers>,
+    /// The buffer that is read in place of pyramid and image.
+    made: Option<Arc<Lent>>,
 }
 
 impl BoundView {
@@ -95,6 +100,9 @@ impl BoundView {
     pub(super) fn record(&mut self, encoder: &mut wgpu::CommandEncoder, pyramid: &Pyramid) {
         if let Some(numbers) = self.numbers.take() {
             pyramid.view.record(encoder, numbers);
+        }
+        if let Some(made) = &self.made {
+            made.read_by(encoder);
         }
     }
 }
@@ -143,19 +151,25 @@ impl PreparedView {
         check_shadow_options(options)?;
         check_coverage(&built, options)?;
         Pyramid::check_source(gpu, &built)?;
-        let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
+        let readers = (instances.len(), options.footprint.log2());
+        let wants_atlas = pyramid.wants_atlas(gpu, &built, readers);
+        let atlas = match encoder.filter(|_| wants_atlas) {
             Some(encoder) => pyramid.record_atlas(gpu, encoder, &built)?,
             None => None,
         };
+        let store = if atlas.is_some() {
+            DepthStore::Atlas
+        } else if built.all.is_some() {
+            DepthStore::Made
+        } else {
+            DepthStore::Apart(built.part.kind)
+        };
+        let is_apart = matches!(store, DepthStore::Apart(_));
         let key = CullKey {
-            store: if atlas.is_some() {
-                DepthStore::Atlas
-            } else {
-                DepthStore::Apart(built.part.kind)
-            },
+            store,
             kind: instances.kind,
             reversed: camera.convention().is_reversed(),
-            chunks: if atlas.is_some() { 1 } else { pyramid.chunks.len() },
+            chunks: if is_apart { pyramid.chunks.len() } else { 1 },
             sample_coverage: options.coverage == Coverage::Sample,
             footprint_log2: options.footprint.log2(),
             descent: view.descent_budget > 0,
@@ -181,14 +195,15 @@ impl PreparedView {
         let views = [self.view, ViewUniform { descent_budget, ..self.view }];
         let parts = views.each_ref().map(bytemuck::bytes_of);
         let texture = self.atlas.as_ref().unwrap_or(&self.built.source).clone();
-        let key = (self.key.store.code(), texture, self.built.nearest.clone());
+        let buffer = self.built.all.as_ref().map(|made| made.buffer().clone());
+        let key = (self.key.store.code(), texture, self.built.nearest.clone(), buffer);
         let bound = pyramid.view.bind(gpu, &key, &parts[..1 + usize::from(grouped)], |view| {
             self.create(gpu, pyramid, view)
         })?;
         let BoundParts { mut parts, numbers } = bound;
         let groups = parts.split_off(1).pop();
         let instances = parts.swap_remove(0);
-        Ok(BoundView { instances, groups, numbers })
+        Ok(BoundView { instances, groups, numbers, made: self.built.all.clone() })
     }
 
     fn create(
@@ -201,6 +216,8 @@ impl PreparedView {
         let chunks;
         if let Some(atlas) = &self.atlas {
             entries.push(entry(3, wgpu::BindingResource::TextureView(atlas)));
+        } else if let Some(made) = &self.built.all {
+            entries.push(entry(3, made.buffer().as_entire_binding()));
         } else {
             chunks = [pyramid.chunk(gpu, 0)?, pyramid.chunk(gpu, 1)?, pyramid.chunk(gpu, 2)?];
             entries.push(entry(0, wgpu::BindingResource::TextureView(&self.built.source)));

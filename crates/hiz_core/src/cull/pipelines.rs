@@ -339,6 +339,8 @@ pub(crate) enum DepthStore {
     Apart(SourceKind),
     /// All levels from one texture.
     Atlas,
+    /// All levels from the buffer in which the host has made them with the image.
+    Made,
 }
 
 /// Where a pass reads depth that reads none (`no_depth.rs`).
@@ -350,6 +352,7 @@ impl DepthStore {
         match self {
             Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
+            Self::Made => vec![wgsl!("pyramid/texels_buffer")],
         }
     }
 
@@ -358,6 +361,7 @@ impl DepthStore {
         match self {
             Self::Apart(source) => source as u32,
             Self::Atlas => 6,
+            Self::Made => 7,
         }
     }
 
@@ -381,6 +385,9 @@ impl DepthStore {
             }
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
+            }
+            Self::Made => {
+                gpu.layout("hiz.cull.made_layout", &[(2, Uniform), (3, Read), (6, Uniform)])
             }
         }
     }

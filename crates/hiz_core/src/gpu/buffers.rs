@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use crate::error::{Error, Result};
 use crate::gpu::checked::checked;
 use crate::gpu::device::Gpu;
+use crate::gpu::kept::Ring;
 
 /// A buffer that is mapped at creation, for the time of the mapping.
 ///
@@ -189,6 +190,32 @@ impl Gpu {
             usage,
             mapped_at_creation: false,
         })
+    }
+
+    /// A mapped buffer for copies to the device, of `size` bytes: a free one of the ring, whose
+    /// buffers have this size, or a new one.
+    pub(crate) fn staging(
+        &self,
+        ring: Option<&Ring>,
+        label: &str,
+        size: u64,
+    ) -> Result<wgpu::Buffer> {
+        self.staging_for(ring, label, size, wgpu::BufferUsages::COPY_SRC)
+    }
+
+    /// The same for other usages than copies.
+    pub(crate) fn staging_for(
+        &self,
+        ring: Option<&Ring>,
+        label: &str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
+        if let Some(free) = ring.and_then(Ring::take) {
+            return Ok(free);
+        }
+        // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into this one.
+        self.mapped(label, size, usage | wgpu::BufferUsages::MAP_WRITE)
     }
 
     /// A buffer of `size` bytes, a multiple of 4, that is mapped at creation.

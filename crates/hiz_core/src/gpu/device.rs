@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 use crate::gpu::checked::checked;
-use crate::gpu::kept::{Kept, KeptBuffers, Known, Ring};
+use crate::gpu::kept::{Kept, KeptBuffers, Known, Ring, Rings};
 use crate::gpu::layouts::{Binding, Layouts};
 use crate::gpu::made::Making;
 use crate::gpu::pipelines::{Compute, Depth, Pipelines};
@@ -51,6 +51,8 @@ pub(crate) struct Gpu {
     pub(super) ring: Ring,
     /// Staging buffers by their size; see [`Gpu::kept_staging`].
     staging: Kept<u64, Ring>,
+    /// Those that images of one size share.
+    pub(crate) rings: Rings,
     /// Bound in place of a sampled texture that a call does not read.
     pub(super) no_texels: OnceLock<wgpu::TextureView>,
     /// Bound in place of an atlas.
@@ -83,6 +85,7 @@ impl Gpu {
             buffers: KeptBuffers::default(),
             ring: Ring::new(STAGING_KEPT),
             staging: Kept::new(STAGING_SIZES),
+            rings: Rings::default(),
             no_texels: OnceLock::new(),
             no_atlas: OnceLock::new(),
             making: Making::default(),
@@ -186,6 +189,13 @@ impl Gpu {
     /// Whether the device is a processor, such as lavapipe or SwiftShader.
     pub(crate) fn is_processor(&self) -> bool {
         self.device.adapter_info().device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether shaders may read buffers that the host has mapped before: on a processor, where both
+    /// share the memory, with the feature for it.
+    pub(crate) fn reads_mapped(&self) -> bool {
+        let feature = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
+        self.is_processor() && self.device.features().contains(feature)
     }
 
     /// The pipeline that `recipe` describes, made on first use.

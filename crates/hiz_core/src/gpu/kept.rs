@@ -29,29 +29,33 @@ impl KeptBuffers {
     }
 }
 
-/// Buffers that are mapped, free and all of one size.
+/// Staging buffers that are mapped, free and all of one size.
 #[derive(Debug, Clone)]
-pub(crate) struct Ring {
-    free: Arc<Locked<Vec<wgpu::Buffer>>>,
+pub(crate) struct Ring(Arc<Locked<Free>>);
+
+/// What a ring keeps, and how many of them at most.
+#[derive(Debug)]
+struct Free {
+    buffers: Vec<wgpu::Buffer>,
     most: usize,
 }
 
 impl Ring {
     /// Keeps `most` buffers; more than that are released.
     pub(crate) fn new(most: usize) -> Self {
-        Self { free: Arc::default(), most }
+        Self(Arc::new(Locked::new(Free { buffers: Vec::new(), most })))
     }
 
-    /// A free buffer, if there is one.
+    /// A free buffer, if there is one: the last that came back, which the caches may still hold.
     pub(crate) fn take(&self) -> Option<wgpu::Buffer> {
-        self.free.lock().pop()
+        self.0.lock().buffers.pop()
     }
 
     /// Takes a buffer back, which must be mapped.
-    pub(crate) fn give(&self, buffer: wgpu::Buffer) {
-        let mut free = self.free.lock();
-        if free.len() < self.most {
-            free.push(buffer);
+    fn give(&self, buffer: wgpu::Buffer) {
+        let mut free = self.0.lock();
+        if free.buffers.len() < free.most {
+            free.buffers.push(buffer);
         }
     }
 
@@ -66,6 +70,58 @@ impl Ring {
     }
 }
 
+/// Rings by the label and the size of their buffers, each as long as somebody has a share of it.
+///
+/// Images that take turns write into the same memory then, which the caches hold.
+#[derive(Debug, Default)]
+pub(crate) struct Rings(Locked<Vec<(RingKey, Weak<Locked<Free>>)>>);
+
+/// What the buffers of a ring are for, and their size in bytes.
+type RingKey = (&'static str, u64);
+
+impl Rings {
+    /// A share of the ring with this key, for which `kept` more buffers are kept.
+    pub(crate) fn share(&self, key: RingKey, kept: usize) -> RingShare {
+        let mut rings = self.0.lock();
+        rings.retain(|(_, ring)| ring.strong_count() > 0);
+        let mut with_key = rings.iter().filter(|(theirs, _)| *theirs == key);
+        let ring = with_key.find_map(|(_, ring)| ring.upgrade()).map_or_else(
+            || {
+                let new = Ring::new(0);
+                rings.push((key, Arc::downgrade(&new.0)));
+                new
+            },
+            Ring,
+        );
+        ring.0.lock().most += kept;
+        RingShare { ring, kept }
+    }
+}
+
+/// A share of a ring that others use, too.
+#[derive(Debug)]
+pub(crate) struct RingShare {
+    ring: Ring,
+    kept: usize,
+}
+
+impl RingShare {
+    pub(crate) fn ring(&self) -> &Ring {
+        &self.ring
+    }
+}
+
+impl Drop for RingShare {
+    fn drop(&mut self) {
+        let mut free = self.ring.0.lock();
+        free.most -= self.kept;
+        let most = free.most.min(free.buffers.len());
+        let too_many = free.buffers.split_off(most);
+        drop(free);
+        drop(too_many);
+    }
+}
+
 /// A buffer of a ring that several recordings copy from, in encoders of their own.
 ///
 /// It comes back, mapped, once nobody holds it and each recording is done or dropped.
@@ -73,14 +129,18 @@ impl Ring {
 pub(crate) struct Lent {
     buffer: wgpu::Buffer,
     /// Weak, so that no buffer is mapped for a ring that is gone.
-    free: Weak<Locked<Vec<wgpu::Buffer>>>,
-    most: usize,
+    ring: Weak<Locked<Free>>,
 }
 
 impl Lent {
     /// Lends a buffer that is not mapped.
     pub(crate) fn new(buffer: wgpu::Buffer, ring: &Ring) -> Arc<Self> {
-        Arc::new(Self { buffer, free: Arc::downgrade(&ring.free), most: ring.most })
+        Arc::new(Self { buffer, ring: Arc::downgrade(&ring.0) })
+    }
+
+    /// The buffer, for bind groups.
+    pub(crate) fn buffer(&self) -> &wgpu::Buffer {
+        &self.buffer
     }
 
     /// The buffer, which the commands of `encoder` are about to read.
@@ -94,8 +154,8 @@ impl Lent {
 
 impl Drop for Lent {
     fn drop(&mut self) {
-        let Some(free) = self.free.upgrade() else { return };
-        let (ring, mapped) = (Ring { free, most: self.most }, self.buffer.clone());
+        let Some(ring) = self.ring.upgrade() else { return };
+        let (ring, mapped) = (Ring(ring), self.buffer.clone());
         self.buffer.map_async(wgpu::MapMode::Write, .., move |outcome| {
             if outcome.is_ok() {
                 ring.give(mapped);

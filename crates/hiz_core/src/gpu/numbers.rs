@@ -47,13 +47,7 @@ impl Gpu {
     /// It holds at most [`STAGING_BYTES`].
     pub(crate) fn numbers(&self, contents: &[u8]) -> Result<Numbers> {
         const LABEL: &str = "hiz.numbers.staging";
-        let staging = match self.ring.take() {
-            Some(free) => free,
-            None => {
-                let usage = wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC;
-                self.mapped(LABEL, STAGING_BYTES, usage)?
-            }
-        };
+        let staging = self.staging(Some(&self.ring), LABEL, STAGING_BYTES)?;
         write_mapped(LABEL, &staging, 0, contents)?;
         staging.unmap();
         Ok(Numbers { staging, len: contents.len() as u64, ring: self.ring.clone() })

@@ -18,8 +18,9 @@ const RECURS: u32 = 16;
 const OWN_KEPT: usize = 4;
 
 /// What tells apart the bind groups over one part: a code of the stage that asks, and the textures
-/// that are bound beside it.
-pub(crate) type BindingKey = (u32, wgpu::TextureView, Option<wgpu::TextureView>);
+/// and the buffer that are bound beside it.
+pub(crate) type BindingKey =
+    (u32, wgpu::TextureView, Option<wgpu::TextureView>, Option<wgpu::Buffer>);
 
 /// A uniform of [`PARTS`] parts, each of which may be bound by itself.
 ///

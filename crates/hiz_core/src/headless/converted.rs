@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::gpu::buffers::Mapped;
-use crate::gpu::row_staging::RowStaging;
+use crate::gpu::row_staging::row_pitch;
 use crate::headless::depth_image::DepthImage;
 use crate::headless::readback;
 use crate::host::threads::{Locked, on_threads};
@@ -29,7 +29,7 @@ impl DepthImage {
         make: impl Fn(u32, &mut [f32]) + Sync,
     ) -> Result<()> {
         let (height, engine) = (self.size().height, &self.engine);
-        let room = (MOST_BYTES / RowStaging::pitch(&self.texture)).clamp(1, height);
+        let room = (MOST_BYTES / row_pitch(&self.texture)).clamp(1, height);
         for first in (0..height).step_by(room as usize) {
             let rows = first..height.min(first + room);
             let is_last = rows.end == height;

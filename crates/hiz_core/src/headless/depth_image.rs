@@ -17,7 +17,9 @@ use crate::occluders::depth::OccluderDepth;
 use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
 use crate::occluders::surface::ConservativeDepthOptions;
 use crate::occluders::uploaded::Occluders;
+use crate::pyramid::built::Owner;
 use crate::pyramid::ends::Depths;
+use crate::pyramid::host_levels::HostLevels;
 use crate::pyramid::source::DepthSource;
 
 /// Bytes of an upload's staging buffer at most.
@@ -81,6 +83,7 @@ impl DepthImage {
     /// texel (`Rgba32Uint`).
     pub fn texture(&self) -> &wgpu::Texture {
         if let Some(drawn) = &self.drawn {
+            self.engine.bring_image(&**drawn);
             self.engine.images().keep_apart(drawn);
             // The caller may write into the texture, too.
             drawn.levels().inspect(|levels| levels.turn_off());
@@ -88,12 +91,21 @@ impl DepthImage {
         &self.texture
     }
 
-    /// What a reduction reads.
+    /// The image in its texture.
     pub(super) fn source(&self) -> DepthSource<'_> {
+        if let Some(drawn) = &self.drawn {
+            self.engine.bring_image(&**drawn);
+        }
+        self.source_with(None)
+    }
+
+    /// What a reduction reads, if the image was drawn with `levels`.
+    ///
+    /// Of such an image [`OccluderDepth::submitting`] is held until the reduction is submitted.
+    pub(super) fn source_with<'a>(&'a self, levels: Option<&'a HostLevels>) -> DepthSource<'a> {
         let Self { tolerance, near_slack, samples, .. } = *self;
         let nearest = self.nearest.as_ref();
         let whole = DepthSource::from(&self.texture);
-        let levels = self.drawn.as_ref().and_then(|drawn| drawn.levels());
         DepthSource { tolerance, near_slack, samples, nearest, levels, ..whole }
     }
 
@@ -118,6 +130,9 @@ impl DepthImage {
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn read(&self) -> Result<Vec<f32>> {
         let engine = &self.engine;
+        if let Some(drawn) = &self.drawn {
+            engine.bring_image(&**drawn);
+        }
         let row = 4 * u64::from(self.size().width);
         let bytes = engine.scoped(|| {
             readback::read_texture(engine.device(), engine.queue(), &self.texture, row)
@@ -332,6 +347,20 @@ impl DepthImage {
 }
 
 impl Engine {
+    /// Brings an image that occluders were drawn into to its texture, if it is not there yet.
+    ///
+    /// Whoever reads the texture calls this before.
+    pub(super) fn bring_image(&self, drawn: &dyn Owner) {
+        let Some(levels) = drawn.levels() else { return };
+        let _in_order = drawn.submitting().lock();
+        if levels.holds_image() {
+            let mut encoder = self.encoder("hiz.depth.encoder");
+            levels.record_image(&mut encoder);
+            self.queue().submit([encoder.finish()]);
+            levels.image_has_come();
+        }
+    }
+
     /// Draws all occluders into a depth image of the camera's size, by the rasteriser that suits
     /// the device.
     ///

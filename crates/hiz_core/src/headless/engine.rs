@@ -163,8 +163,12 @@ impl Engine {
                 request.map_or_else(|| "was found".to_owned(), |r| format!("matches {r:?}"));
             return Err(adapter::no_adapter(request, &seen));
         };
-        let features = adapter.features()
-            & (wgpu::Features::INDIRECT_FIRST_INSTANCE | wgpu::Features::TIMESTAMP_QUERY);
+        let mut wanted = wgpu::Features::INDIRECT_FIRST_INSTANCE | wgpu::Features::TIMESTAMP_QUERY;
+        if adapter.get_info().device_type == wgpu::DeviceType::Cpu {
+            // What the host draws is read in place (`Gpu::reads_mapped`).
+            wanted |= wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
+        }
+        let features = adapter.features() & wanted;
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("hiz.device"),
             required_features: features,

@@ -42,7 +42,7 @@ impl Images {
             return Ok(Arc::clone(free));
         }
         drop(kept);
-        let image = Arc::new(context.create_occluder_depth(size, rasteriser)?);
+        let image = Arc::new(OccluderDepth::new(&context.gpu, size, rasteriser, true)?);
         let mut kept = self.0.lock();
         let pixels = |kept: &[(Rasteriser, Arc<OccluderDepth>)]| -> u64 {
             kept.iter().map(|(_, image)| image.size().pixels()).sum()

@@ -52,16 +52,22 @@ impl Engine {
     fn submit_reduce(&self, depth: &DepthImage, pyramid: &Pyramid) -> Result<()> {
         depth.check_depths(pyramid.depths())?;
         let _in_order = pyramid.submitting.lock();
+        let drawn = depth.drawn.as_ref();
+        let _drawn_in_order = drawn.map(|drawn| drawn.submitting.lock());
+        let levels = drawn.and_then(|drawn| drawn.levels());
         let mut encoder = self.encoder("hiz.reduce.encoder");
         let gpu = &self.context().gpu;
         self.timed(&mut encoder, |encoder| {
-            record_reduce(gpu, encoder, &depth.source(), &depth.camera, pyramid)
+            record_reduce(gpu, encoder, &depth.source_with(levels), &depth.camera, pyramid)
         })?;
         pyramid.no_data_is_far.store(depth.no_data_is_far, Ordering::Relaxed);
-        if let Some(drawn) = &depth.drawn {
+        if let Some(drawn) = drawn {
             pyramid.keep_with_it(Arc::clone(drawn) as Arc<dyn Owner>);
         }
         self.queue().submit([encoder.finish()]);
+        if pyramid.built().is_some_and(|built| built.all.is_none()) {
+            levels.inspect(|levels| levels.image_has_come());
+        }
         Ok(())
     }
 
@@ -121,6 +127,9 @@ impl Engine {
                          float32, got 0"
                     ),
                 ));
+            }
+            if let Some(owner) = &built.owner {
+                self.bring_image(&**owner);
             }
             let [x, y] = part.origin.map(u64::from);
             let crop = readback::Crop {

@@ -56,6 +56,9 @@ impl Engine {
             ..DepthSource::from(&of.texture)
         };
         self.scoped(|| {
+            if let Some(owner) = &built.owner {
+                self.bring_image(&**owner);
+            }
             let mips = MipTexture::new(gpu, pyramid.size(), options)?;
             let _in_order = pyramid.submitting.lock();
             let mut encoder = self.encoder("hiz.mips.encoder");

@@ -132,15 +132,7 @@ impl Records {
         fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
     ) -> Result<(Upload, T)> {
         let size = self.row_bytes() * rows.len() as u64;
-        let staging = match ring.as_ref().and_then(Ring::take) {
-            Some(free) => free,
-            None => {
-                // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into
-                // this one.
-                let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
-                gpu.mapped(label, size, usage)?
-            }
-        };
+        let staging = gpu.staging(ring.as_ref(), label, size)?;
         let filled = fill(&Mapped::of(label, &staging))?;
         staging.unmap();
         Ok((Upload { staging, texture: self.texture.clone(), rows, ring }, filled))

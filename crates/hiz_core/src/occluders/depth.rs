@@ -1,9 +1,12 @@
 //! A depth image that occluders are drawn into, by the rasteriser that suits the device.
 
+use std::ops::Range;
+
 use crate::error::{Error, Result};
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::{ContextId, Gpu};
-use crate::gpu::row_staging::RowStaging;
+use crate::gpu::kept::RingShare;
+use crate::gpu::row_staging::{record_rows, staging_bytes};
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
@@ -11,10 +14,13 @@ use crate::occluders::device_raster::{OCCLUDER_DEPTH_FORMAT, record_occluders};
 use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
 use crate::occluders::host_raster::{HostRaster, Way};
 use crate::occluders::uploaded::Occluders;
+use crate::pyramid::built::Owner;
 use crate::pyramid::host_levels::HostLevels;
 use crate::pyramid::source::DepthSource;
 
-/// Staging buffers that an image keeps: two frames may be on their way.
+const STAGING: &str = "hiz.occluders.staging";
+
+/// Staging buffers that are kept for an image: two frames may be on their way.
 const STAGING_KEPT: usize = 2;
 
 /// A depth image for occluders, made once and drawn each frame.
@@ -64,14 +70,21 @@ pub struct OccluderDepth {
     size: ImageSize,
     texture: wgpu::Texture,
     view: wgpu::TextureView,
-    /// The image of the rasteriser on the host, if that one draws.
-    host: Option<Locked<HostImage>>,
+    /// What the rasteriser on the host has, if that one draws.
+    host: Option<Host>,
+    /// Held from the recording to the submit by those who submit, so that drawings, and what reads
+    /// the texture, keep their order.
+    pub(crate) submitting: Locked<()>,
+}
+
+/// An image of the host's rasteriser, and how it comes to the device.
+#[derive(Debug)]
+struct Host {
+    image: Locked<HostImage>,
     /// Buffers through which rows come to the texture.
-    staging: RowStaging,
+    staging: RingShare,
     /// Levels that the host makes with the image.
     levels: Option<HostLevels>,
-    /// Held from the recording to the submit by those who submit, so that drawings keep their order.
-    pub(crate) submitting: Locked<()>,
 }
 
 /// What the host's rasteriser has drawn.
@@ -83,7 +96,14 @@ struct HostImage {
 }
 
 impl OccluderDepth {
-    pub(crate) fn new(gpu: &Gpu, size: ImageSize, rasteriser: Rasteriser) -> Result<Self> {
+    /// `keeps_image`: what the host draws stays on the host until a copy to the texture is asked
+    /// for ([`HostLevels::record_image`]), where culls can do without the texture.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        size: ImageSize,
+        rasteriser: Rasteriser,
+        keeps_image: bool,
+    ) -> Result<Self> {
         if size.width == 0 || size.height == 0 {
             return Err(Error::invalid("size", format!("expected at least one pixel, got {size}")));
         }
@@ -112,19 +132,12 @@ impl OccluderDepth {
         let texture =
             gpu.texture("hiz.depth.image", (texels.width, texels.height), format, usage)?;
         let view = gpu.view(&texture)?;
-        let host = on_host
-            .then(|| Locked::new(HostImage { raster: HostRaster::new(size), convention: None }));
-        let levels = host.as_ref().and_then(|_| HostLevels::new(gpu, &texture, size));
-        Ok(Self {
-            context: gpu.id(),
-            size,
-            levels,
-            texture,
-            view,
-            host,
-            staging: RowStaging::new("hiz.occluders.staging", 1, STAGING_KEPT, u64::MAX),
-            submitting: Locked::default(),
-        })
+        let host = on_host.then(|| Host {
+            image: Locked::new(HostImage { raster: HostRaster::new(size), convention: None }),
+            staging: gpu.rings.share((STAGING, staging_bytes(&texture, size.height)), STAGING_KEPT),
+            levels: HostLevels::new(gpu, &texture, size, keeps_image),
+        });
+        Ok(Self { context: gpu.id(), size, texture, view, host, submitting: Locked::default() })
     }
 
     /// The image's size in pixels.
@@ -152,7 +165,7 @@ impl OccluderDepth {
 
     /// Levels that the host makes with the image, if it draws it.
     pub(crate) fn levels(&self) -> Option<&HostLevels> {
-        self.levels.as_ref()
+        self.host.as_ref().and_then(|host| host.levels.as_ref())
     }
 
     /// Records the drawing of `occluders`.
@@ -184,7 +197,7 @@ impl OccluderDepth {
         }
         // What is refused leaves the image as it was.
         occluders.surface.check_drawing(camera, options)?;
-        let mut image = host.lock();
+        let mut image = host.image.lock();
         let convention = camera.convention();
         match options.load {
             DepthLoad::Clear => image.raster.clear(),
@@ -201,8 +214,10 @@ impl OccluderDepth {
             }
         }
         // An image that is new or cleared has to come to the device as a whole.
-        // So has one whose rows could not be copied, or the texture would keep older ones.
-        let is_whole = options.load == DepthLoad::Clear || image.convention.is_none();
+        // So has one whose rows could not be copied, or the texture would keep older ones, and one
+        // that is not in the texture yet.
+        let is_held = host.levels.as_ref().is_some_and(HostLevels::holds_image);
+        let is_whole = options.load == DepthLoad::Clear || image.convention.is_none() || is_held;
         image.convention = None;
         let way = Way { threads: None, skip: true };
         let touched = occluders.surface.draw_into(&mut image.raster, camera, way, options)?;
@@ -214,32 +229,50 @@ impl OccluderDepth {
         if !rows.is_empty() {
             // What is added to an image changes few of its levels; a reduction of that part does.
             let is_anew = options.load == DepthLoad::Clear;
-            self.record_rows(gpu, encoder, &image.raster, convention, rows, is_anew)?;
+            let drawn = (&image.raster, convention, rows);
+            host.record_rows(gpu, encoder, &self.texture, drawn, is_anew)?;
         }
         image.convention = Some(convention);
         Ok(touched)
     }
+}
 
+impl Owner for OccluderDepth {
+    fn submitting(&self) -> &Locked<()> {
+        &self.submitting
+    }
+
+    fn levels(&self) -> Option<&HostLevels> {
+        self.levels()
+    }
+}
+
+impl Host {
     /// Records the copy of rows of the host's image into the texture, and of its levels, if the
     /// rows are all of an image that was drawn anew.
+    /// Such an image may stay with its levels.
     fn record_rows(
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
-        raster: &HostRaster,
-        convention: DepthConvention,
-        rows: std::ops::Range<u32>,
+        texture: &wgpu::Texture,
+        (raster, convention, rows): (&HostRaster, DepthConvention, Range<u32>),
         is_anew: bool,
     ) -> Result<()> {
         let levels = match &self.levels {
             Some(levels) if is_anew => levels.begin(gpu, convention)?,
             _ => None,
         };
-        let part = (&self.texture, rows.clone(), self.size.height);
-        self.staging.record(gpu, encoder, part, |mapped, pitch| {
-            let open = |part| mapped.range(part);
-            raster.write_rows(open, pitch, convention, &rows, levels.as_ref())
-        })?;
+        if let Some((made, pitch)) = levels.as_ref().and_then(|l| Some(l).zip(l.image_pitch())) {
+            let open = |part| made.open_image(part);
+            raster.write_rows(open, pitch, convention, &rows, Some(made))?;
+        } else {
+            let (ring, part) = (self.staging.ring(), (texture, rows.clone(), texture.height()));
+            record_rows(gpu, encoder, (ring, STAGING), part, |mapped, pitch| {
+                let open = |part| mapped.range(part);
+                raster.write_rows(open, pitch, convention, &rows, levels.as_ref())
+            })?;
+        }
         match (levels, &self.levels) {
             (Some(made), _) => made.record(gpu, encoder),
             (None, Some(levels)) => levels.retract(gpu, encoder),

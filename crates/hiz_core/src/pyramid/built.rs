@@ -4,12 +4,20 @@
 
 use std::sync::Arc;
 
+use crate::gpu::kept::Lent;
+use crate::host::threads::Locked;
 use crate::input::camera::Camera;
+use crate::pyramid::host_levels::HostLevels;
 use crate::pyramid::source::Part;
 
-/// Whatever keeps a depth image from being drawn again while it is alive.
-pub(crate) trait Owner: std::fmt::Debug + Send + Sync {}
-impl<T: std::fmt::Debug + Send + Sync> Owner for T {}
+/// What a depth image was drawn with: while it is alive, the image is not drawn again.
+pub(crate) trait Owner: std::fmt::Debug + Send + Sync {
+    /// Held by those who submit commands that read or write the image, while they record them.
+    fn submitting(&self) -> &Locked<()>;
+
+    /// What the host has made with the image.
+    fn levels(&self) -> Option<&HostLevels>;
+}
 
 /// The depth image of a reduction, and what a cull has to know about it.
 #[derive(Debug, Clone)]
@@ -24,6 +32,8 @@ pub(crate) struct Built {
     /// Where the image lies in its texture, and what was rounded in it: every cull counts that.
     pub(crate) part: Part,
     pub(crate) camera: Camera,
+    /// All levels and the image in one buffer, if the host has made them there.
+    pub(crate) all: Option<Arc<Lent>>,
     /// Keeps the image as it is for those who read it later.
     pub(crate) owner: Option<Arc<dyn Owner>>,
 }

@@ -6,6 +6,10 @@
 //!
 //! A reduction copies them from the buffer that the host has written.
 //!
+//! Where shaders may read that buffer ([`Gpu::reads_mapped`]), it may have the image, too.
+//! Culls read all of it in place then, and nobody waits for the image to come to its texture.
+//! **Whoever reads the texture records that copy first** ([`HostLevels::record_image`]).
+//!
 //! **In whichever order recordings are submitted, a pyramid has the levels of its image, or culls
 //! keep everything.**
 //! Each drawing has a number, which the commands that bring its image to the device put beside it.
@@ -21,7 +25,7 @@ use std::sync::{Arc, OnceLock};
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{Mapped, made};
 use crate::gpu::device::Gpu;
-use crate::gpu::kept::{Lent, Ring};
+use crate::gpu::kept::{Lent, RingShare};
 use crate::host::memory;
 use crate::host::threads::Locked;
 use crate::input::image::{DepthConvention, ImageSize};
@@ -33,8 +37,9 @@ use crate::pyramid::numbering::next_number;
 
 const LABEL: &str = "hiz.host_levels";
 const STAGING: &str = "hiz.host_levels.staging";
+const WITH_IMAGE: &str = "hiz.host_levels.with_image";
 
-/// Staging buffers that are kept: two frames may be on their way.
+/// Staging buffers that are kept for an image: two frames may be on their way.
 const STAGING_KEPT: usize = 2;
 
 /// Bytes of a texel: a word.
@@ -53,9 +58,11 @@ pub struct HostLevels {
     texture: wgpu::Texture,
     /// All levels of farthest depths, in one chunk.
     layout: PyramidLayout,
+    /// Where the image lies behind them, if it stays in their buffer.
+    image: Option<Level>,
     /// The number of the drawing that is in the texture; made by the first one.
     drawn: OnceLock<wgpu::Buffer>,
-    free: Ring,
+    free: RingShare,
     /// What the last drawing has made; `None` if it made none.
     made: Locked<Option<Made>>,
     /// Whether a reduction has asked for them since the last drawing.
@@ -70,8 +77,9 @@ struct Made {
     number: u32,
     /// The depths that are farthest depend on it.
     convention: DepthConvention,
-    /// The number, and the levels behind it.
+    /// The number, the levels behind it, and the image if it stays there.
     staging: Arc<Lent>,
+    is_in_texture: bool,
 }
 
 /// A copy from one buffer to another, in bytes.
@@ -88,11 +96,18 @@ pub(super) struct Copied<'a> {
     drawn: &'a wgpu::Buffer,
     levels: Arc<Lent>,
     copies: Vec<LevelCopy>,
+    /// Whether the buffer of the levels has all that culls read, where they look for it.
+    is_all: bool,
     /// The number that the pyramid then begins with.
     pub(super) number: u32,
 }
 
 impl Copied<'_> {
+    /// The buffer that culls may read in place of the pyramid and the image.
+    pub(super) fn all(&self) -> Option<&Arc<Lent>> {
+        self.is_all.then_some(&self.levels)
+    }
+
     /// Records the copies into the only chunk of a pyramid.
     pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, chunk: &wgpu::Buffer) {
         encoder.copy_buffer_to_buffer(self.drawn, 0, chunk, 0, HEADER_BYTES);
@@ -106,15 +121,25 @@ impl Copied<'_> {
 impl HostLevels {
     /// Those of an image of `size` in `texture`; `None` for one that has no levels, or more than
     /// one storage binding holds.
-    pub(crate) fn new(gpu: &Gpu, texture: &wgpu::Texture, size: ImageSize) -> Option<Self> {
+    ///
+    /// `keeps_image`: the image stays in their buffer, if shaders may read that.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        texture: &wgpu::Texture,
+        size: ImageSize,
+        keeps_image: bool,
+    ) -> Option<Self> {
         let shift = chunk_shift(gpu.limits());
         let layout = PyramidLayout::new(size, StoredLevels::ALL, Depths::Farthest, shift).ok()?;
         let fits = layout.num_levels() > 1 && layout.chunk_sizes().len() == 1;
+        let image = layout.image().filter(|_| keeps_image && gpu.reads_mapped());
+        let key = (label(image), staging_bytes(&layout, image));
         fits.then(|| Self {
             texture: texture.clone(),
             layout,
+            image,
             drawn: OnceLock::new(),
-            free: Ring::new(STAGING_KEPT),
+            free: gpu.rings.share(key, STAGING_KEPT),
             made: Locked::default(),
             // Images are drawn to be reduced.
             are_wanted: AtomicBool::new(true),
@@ -153,16 +178,14 @@ impl HostLevels {
     }
 
     fn rows(&self, gpu: &Gpu, convention: DepthConvention) -> Result<LevelRows<'_>> {
-        let bytes = self.layout.texels * WORD;
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let drawn = made(&self.drawn, || gpu.empty(LABEL, HEADER_BYTES, usage))?;
-        let staging = match self.free.take() {
-            Some(free) => free,
-            None => {
-                let usage = wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC;
-                gpu.mapped(STAGING, bytes, usage)?
-            }
+        let bytes = staging_bytes(&self.layout, self.image);
+        let usage = match self.image {
+            Some(_) => wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::STORAGE,
+            None => wgpu::BufferUsages::COPY_SRC,
         };
+        let staging = gpu.staging_for(Some(self.free.ring()), label(self.image), bytes, usage)?;
         let last = BLOCK_LOG2.min(self.layout.num_levels() - 1);
         let Level { width, height, .. } = self.layout.levels[last as usize];
         let coarse = memory::filled(padded(width) * height as usize, 0, "texels")?;
@@ -189,6 +212,40 @@ impl HostLevels {
         })
     }
 
+    /// Whether the last drawing is not in the texture yet.
+    pub(crate) fn holds_image(&self) -> bool {
+        self.made.lock().as_ref().is_some_and(|made| !made.is_in_texture)
+    }
+
+    /// Records the copy of the image to its texture, if the last drawing has not made it.
+    ///
+    /// The commands that read the texture come behind it, and no drawing is submitted in between.
+    /// So whoever keeps the order of drawings keeps that of this copy, too.
+    pub(crate) fn record_image(&self, encoder: &mut wgpu::CommandEncoder) {
+        let made = self.made.lock().clone().filter(|made| !made.is_in_texture);
+        let Some((Made { staging, .. }, image)) = made.zip(self.image) else { return };
+        let buffer = staging.read_by(encoder);
+        encoder.copy_buffer_to_texture(
+            wgpu::TexelCopyBufferInfo {
+                buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: u64::from(image.offset) * WORD,
+                    bytes_per_row: Some(image.stride * WORD as u32),
+                    rows_per_image: None,
+                },
+            },
+            self.texture.as_image_copy(),
+            self.texture.size(),
+        );
+    }
+
+    /// Notes that the copy of the image was submitted, and no drawing since it was recorded.
+    pub(crate) fn image_has_come(&self) {
+        if let Some(made) = &mut *self.made.lock() {
+            made.is_in_texture = true;
+        }
+    }
+
     /// What a reduction of the image in `texture` into a pyramid of `layout` can copy.
     /// The next drawing makes levels, if they fit this pyramid.
     pub(super) fn for_pyramid(
@@ -204,8 +261,21 @@ impl HostLevels {
         self.are_wanted.store(true, Ordering::Relaxed);
         let made = self.made.lock().clone().filter(|made| made.convention == convention)?;
         let Made { number, staging: levels, .. } = made;
-        Some(Copied { drawn: self.drawn.get()?, levels, copies, number })
+        let is_all = self.image.is_some() && self.layout.levels == layout.levels;
+        Some(Copied { drawn: self.drawn.get()?, levels, copies, is_all, number })
     }
+}
+
+fn label(image: Option<Level>) -> &'static str {
+    if image.is_some() { WITH_IMAGE } else { STAGING }
+}
+
+/// Bytes of the levels, and of an image behind them.
+fn staging_bytes(levels: &PyramidLayout, image: Option<Level>) -> u64 {
+    let of_image = |image: Level| {
+        (u64::from(image.offset) + u64::from(image.stride) * u64::from(image.height)) * WORD
+    };
+    image.map_or(levels.texels * WORD, of_image)
 }
 
 /// The copies of levels; `None` where the pyramid of the second layout has others, or has them in
@@ -256,11 +326,26 @@ impl LevelRows<'_> {
         &self.levels.layout.levels[k as usize]
     }
 
+    fn mapped(&self) -> Mapped<'_> {
+        Mapped::of(label(self.levels.image), &self.staging)
+    }
+
     /// Opens some rows of a level.
     fn open(&self, k: u32, rows: Range<u32>) -> Result<wgpu::BufferViewMut> {
         let Level { offset, stride, .. } = *self.level(k);
         let byte = |row: u32| (u64::from(offset) + u64::from(row) * u64::from(stride)) * WORD;
-        Mapped::of(STAGING, &self.staging).range(byte(rows.start)..byte(rows.end))
+        self.mapped().range(byte(rows.start)..byte(rows.end))
+    }
+
+    /// Bytes from row to row of the image, if it stays with its levels.
+    pub(crate) fn image_pitch(&self) -> Option<usize> {
+        self.levels.image.map(|image| image.stride as usize * WORD as usize)
+    }
+
+    /// Opens some bytes of such an image.
+    pub(crate) fn open_image(&self, bytes: Range<u64>) -> Result<wgpu::BufferViewMut> {
+        let first = self.levels.image.map_or(0, |image| u64::from(image.offset) * WORD);
+        self.mapped().range(first + bytes.start..first + bytes.end)
     }
 
     /// Begins the levels of some rows of the image, the first of which begins a block.
@@ -286,17 +371,18 @@ impl LevelRows<'_> {
     pub(crate) fn record(self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
         self.make_coarser()?;
         let number = next_number();
-        let mut header = Mapped::of(STAGING, &self.staging).range(0..HEADER_BYTES)?;
+        let mut header = self.mapped().range(0..HEADER_BYTES)?;
         header.slice(..).copy_from_slice(bytemuck::bytes_of(&[number, 0, 0, 0]));
         drop(header);
         let Self { levels, drawn, staging, convention, .. } = self;
         staging.unmap();
-        let staging = Lent::new(staging, &levels.free);
+        let staging = Lent::new(staging, levels.free.ring());
         gpu.recorded(|| {
             encoder.copy_buffer_to_buffer(staging.read_by(encoder), 0, drawn, 0, HEADER_BYTES);
             Ok(())
         })?;
-        *levels.made.lock() = Some(Made { number, convention, staging });
+        let is_in_texture = levels.image.is_none();
+        *levels.made.lock() = Some(Made { number, convention, staging, is_in_texture });
         Ok(())
     }
 

@@ -212,6 +212,17 @@ impl PyramidLayout {
         (0..count).map(|i| (self.texels - i * chunk).min(chunk)).collect()
     }
 
+    /// Where the depth image lies in a buffer that holds it, too, behind the levels.
+    ///
+    /// `None` where one binding does not hold all of that.
+    pub(crate) fn image(&self) -> Option<Level> {
+        let Level { width, height, .. } = self.levels[0];
+        let stride = width.next_multiple_of(ROW_ALIGNMENT);
+        let end = self.texels + u64::from(stride) * u64::from(height);
+        let offset = u32::try_from(self.texels).ok()?;
+        (end <= 1 << self.chunk_shift).then_some(Level { offset, stride, width, height })
+    }
+
     /// The number of levels, level 0 included.
     pub(crate) fn num_levels(&self) -> u32 {
         self.levels.len() as u32
@@ -310,7 +321,22 @@ mod tests {
                 end = level.offset + level.stride * level.height;
             }
             assert!(u64::from(end) <= layout.texels);
+            let image = layout.image().unwrap();
+            assert!(u64::from(image.offset) >= layout.texels && image.stride >= w);
+            // A copy to a texture begins at a texel of 16 bytes, and its rows at 256.
+            assert!(image.offset.is_multiple_of(4) && image.stride.is_multiple_of(64));
         }
+    }
+
+    #[test]
+    fn the_image_lies_behind_the_levels_where_one_binding_holds_both() {
+        let of_shift = |shift| {
+            let size = ImageSize::new(640, 360);
+            PyramidLayout::new(size, StoredLevels::ALL, Depths::Farthest, shift).unwrap().image()
+        };
+        let Level { offset, stride, .. } = of_shift(19).unwrap();
+        assert!((1 << 18..1 << 19).contains(&(offset + stride * 360)));
+        assert_eq!(of_shift(18), None);
     }
 
     #[test]

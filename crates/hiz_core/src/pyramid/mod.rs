@@ -53,7 +53,7 @@ use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
-use crate::pyramid::atlas::{Atlas, AtlasUse};
+use crate::pyramid::atlas::{Atlas, AtlasUse, Readers};
 use crate::pyramid::built::{Built, Owner};
 use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::{PYRAMID_CHUNKS, PyramidLayout, chunk_shift};
@@ -213,6 +213,7 @@ impl Pyramid {
             .collect::<Result<_>>()?;
         let mut levels = [Level { offset: 0, stride: 0, width: 0, height: 0 }; MAX_LEVELS];
         levels[..layout.levels.len()].copy_from_slice(&layout.levels);
+        levels[0] = layout.image().unwrap_or(levels[0]);
         let (StoredLevels { first, last }, origins) = (layout.stored, layout.atlas.origins);
         let uniform = gpu.uniform(
             "hiz.pyramid.layout",
@@ -290,12 +291,18 @@ impl Pyramid {
         self.chunks.iter().map(wgpu::Buffer::size).sum::<u64>() + atlas
     }
 
-    /// Whether culls of `instances` instances read an atlas: where one is possible, and pays.
+    /// Whether a cull reads an atlas: where one is possible, and pays.
     ///
     /// `built` is what the cull is against.
     /// The pyramid may meanwhile be built from another kind of image.
-    pub(crate) fn wants_atlas(&self, gpu: &Gpu, built: &Built, instances: u32) -> bool {
-        self.atlas_use.pays(&self.layout, instances)
+    pub(crate) fn wants_atlas(
+        &self,
+        gpu: &Gpu,
+        built: &Built,
+        (instances, footprint_log2): (u32, u32),
+    ) -> bool {
+        let in_one_buffer = built.all.is_some();
+        self.atlas_use.pays(&self.layout, Readers { instances, footprint_log2, in_one_buffer })
             && !self.no_atlas.load(Ordering::Relaxed)
             && atlas::is_possible(&self.layout, &built.part, gpu.limits())
     }
@@ -404,6 +411,12 @@ impl Pyramid {
     #[cfg(feature = "testing")]
     pub fn has_host_levels(&self) -> bool {
         self.are_copied.load(Ordering::Relaxed)
+    }
+
+    /// Whether culls may read all levels and the image in the buffer that the host has written.
+    #[cfg(feature = "testing")]
+    pub fn is_in_one_buffer(&self) -> bool {
+        self.built().is_some_and(|built| built.all.is_some())
     }
 
     /// The buffer of chunk `i`, or a stand-in if the pyramid has fewer chunks.

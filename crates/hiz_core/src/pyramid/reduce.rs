@@ -165,7 +165,15 @@ impl Prepared {
     ) -> Result<Self> {
         let kind = part.kind;
         let (source, view, nearest) = source_bindings(gpu, &part, pyramid)?;
-        let built = Built { reduction: number, source: view, nearest, part, camera, owner: None };
+        let built = Built {
+            reduction: number,
+            source: view,
+            nearest,
+            part,
+            camera,
+            all: None,
+            owner: None,
+        };
         let dispatch = |(step, blocks): (&Step, &Blocks)| {
             let tall = step.source == 0 && reads_tall(step, kind, pyramid.size());
             let (shape, workgroups) = shape_of(step, blocks.size(), tall);
@@ -240,13 +248,23 @@ pub(crate) fn record_reduce(
     let levels = depth.levels.and_then(|levels| {
         levels.for_pyramid(&part.subresource.texture, camera.convention(), &pyramid.layout)
     });
+    let bring_image = |encoder: &mut wgpu::CommandEncoder| {
+        gpu.recorded(|| {
+            depth.levels.inspect(|levels| levels.record_image(encoder));
+            Ok(())
+        })
+    };
     if let Some(levels) = levels {
+        if levels.all().is_none() {
+            bring_image(encoder)?;
+        }
         return record_copies(gpu, encoder, (part, camera), pyramid, &levels);
     }
     let reduction = next_number();
     let prepared = Prepared::of_all(gpu, part, camera, pyramid, reduction)?;
     let numbers = Recording { reduction, base: 0, origin: prepared.built.part.origin };
     let staged = Steps::numbers(gpu, &pyramid.layout.steps, &numbers)?;
+    bring_image(encoder)?;
     let header = Some(&pyramid.chunks[0]);
     finish(gpu, encoder, pyramid, prepared, (&pyramid.steps, staged, header))
 }
@@ -266,8 +284,8 @@ fn record_copies(
         levels.record(encoder, &pyramid.chunks[0]);
         Ok(())
     })?;
-    let (camera, reduction) = (camera.clone(), levels.number);
-    note(encoder, pyramid, Built { reduction, source, nearest, part, camera, owner: None });
+    let (camera, reduction, all) = (camera.clone(), levels.number, levels.all().cloned());
+    note(encoder, pyramid, Built { reduction, source, nearest, part, camera, all, owner: None });
     #[cfg(feature = "testing")]
     pyramid.are_copied.store(true, Ordering::Relaxed);
     Ok(())

@@ -125,7 +125,8 @@ pub(super) fn all() -> Vec<(String, Source)> {
                 .map(|(name, m)| (format!("{name} {source:?}"), m)),
         );
     }
-    let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
+    let others = [DepthStore::Atlas, DepthStore::Made];
+    let stores = SOURCES.map(DepthStore::Apart).into_iter().chain(others);
     // The sets of an early pass differ in a constant, and in what is decided.
     let early = [Candidates::History, Candidates::Size]
         .map(|candidates| (DepthStore::Atlas, FramePass::Early(candidates)));
