@@ -16,6 +16,7 @@ use crate::input::tolerance::DepthTolerance;
 use crate::input::world_tolerance::WorldTolerance;
 use crate::instances::Instances;
 use crate::instances::update::record_idle_update;
+use crate::occluders::drawing::{DepthLoad, DrawOptions};
 use crate::occluders::uploaded::Occluders;
 use crate::output::outputs::Outputs;
 use crate::output::views::ViewsOutputs;
@@ -83,7 +84,38 @@ impl Engine {
             Some(occluders) => self.render_depth(occluders, camera)?,
             None => self.far_depth(camera, levels, more.samples)?,
         };
-        let pyramid = self.pyramid_with(&depth, levels)?;
+        let pyramid = self.warm_up_frame(instances, &depth, levels, options, outputs, more)?;
+        if let Some(occluders) = occluders
+            && pyramid.built().is_some_and(|built| built.all.is_some())
+        {
+            // An image to which more was added is read in its texture.
+            let add = DrawOptions { load: DepthLoad::Load, ..DrawOptions::default() };
+            self.render_depth_into(&depth, occluders, &add)?;
+            self.warm_up_frame(instances, &depth, levels, options, outputs, more)?;
+        }
+        self.scoped(|| {
+            let (gpu, mut encoder) = (&self.context().gpu, self.encoder("hiz.update.warm_up"));
+            record_idle_update(gpu, &mut encoder, instances)?;
+            // The host may have made this pyramid's levels, and leave later ones to the device.
+            record_idle_reduce(gpu, &mut encoder, &depth.source(), camera, &pyramid)?;
+            self.queue().submit([encoder.finish()]);
+            Ok(())
+        })?;
+        self.wait()
+    }
+
+    /// Runs what comes behind the depth image, and returns the pyramid.
+    fn warm_up_frame(
+        &self,
+        instances: &Arc<Instances>,
+        depth: &DepthImage,
+        levels: &PyramidOptions,
+        options: &CullOptions,
+        outputs: &Outputs,
+        more: &MoreWarmUp,
+    ) -> Result<Arc<Pyramid>> {
+        let camera = depth.camera();
+        let pyramid = self.pyramid_with(depth, levels)?;
         let culling = self.cull(instances, camera, &pyramid, options, outputs)?;
         if outputs.mask {
             culling.mask()?;
@@ -104,15 +136,7 @@ impl Engine {
             let extras = CullExtras::default();
             self.cull_views(instances, &views, options, &outputs, &extras)?.masks()?;
         }
-        self.scoped(|| {
-            let (gpu, mut encoder) = (&self.context().gpu, self.encoder("hiz.update.warm_up"));
-            record_idle_update(gpu, &mut encoder, instances)?;
-            // The host may have made this pyramid's levels, and leave later ones to the device.
-            record_idle_reduce(gpu, &mut encoder, &depth.source(), camera, &pyramid)?;
-            self.queue().submit([encoder.finish()]);
-            Ok(())
-        })?;
-        self.wait()
+        Ok(pyramid)
     }
 
     /// An image in which nothing is before the far plane.
