@@ -9,6 +9,7 @@ const MAX_LEVELS: u32 = 16u;
 // Twin: `Level` in `crates/hiz_core/src/pyramid/levels.rs`.
 struct Level {
     // In words of the list; both are 0 for a level that is not stored.
+    // Level 0 has its place in the buffer of a host that makes all levels (`texels_buffer.wgsl`).
     offset: u32,
     stride: u32,
     width: u32,

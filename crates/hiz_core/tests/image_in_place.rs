@@ -130,13 +130,28 @@ fn culls_find_what_they_find_in_an_uploaded_image() {
     for (convention, (width, height), options) in all_sizes.chain(all_ways) {
         let camera = camera_along_z(width, height, convention);
         let depth = held(engine, &triangles(engine, u64::from(width), 12), &camera);
-        let here = pyramid(engine, &depth, StoredLevels::ALL);
+        let first = pyramid(engine, &depth, StoredLevels::ALL);
         let is_large = width.max(height) > 1;
-        assert_eq!(here.is_in_one_buffer(), is_processor(engine) && is_large, "{width}x{height}");
+        assert_eq!(first.is_in_one_buffer(), is_processor(engine) && is_large, "{width}x{height}");
         let there = pyramid(engine, &uploaded(engine, &depth), StoredLevels::ALL);
+        // One whose image has not come to its texture, as it has by now.
+        drop((first, depth));
+        let depth = held(engine, &triangles(engine, u64::from(width), 12), &camera);
+        let here = pyramid(engine, &depth, StoredLevels::ALL);
         assert!(!there.is_in_one_buffer());
         for kind in KINDS {
             let instances = instances(engine, kind, 300);
+            // An engine brings the image to its texture before it counts pixels.
+            let words = [&here, &there].map(|pyramid| {
+                let visible = engine.context().create_visible(&instances, &outputs).unwrap();
+                let mut own = engine.device().create_command_encoder(&Default::default());
+                let hiz = engine.context();
+                hiz.record_cull(&mut own, &instances, &camera, pyramid, &visible, &options)
+                    .unwrap();
+                engine.queue().submit([own.finish()]);
+                words_of(engine, visible.pixels(0).expect("counts"))
+            });
+            assert!(words[0] == words[1], "{width}x{height} {convention:?} {kind:?} {options:?}");
             let [here, there] = [&here, &there].map(|pyramid| {
                 engine.cull(&instances, &camera, pyramid, &options, &outputs).unwrap()
             });

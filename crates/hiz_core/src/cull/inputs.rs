@@ -50,6 +50,14 @@ impl<'a> CullInputs<'a> {
     ) -> Self {
         Self { instances, camera, pyramid, options, among: None, idle: false, built: None }
     }
+
+    /// What the pyramid is built from.
+    ///
+    /// # Errors
+    /// Those of [`Pyramid::built_for`].
+    pub(super) fn built(&self) -> Result<Built> {
+        self.built.map_or_else(|| self.pyramid.built_for(self.camera), |built| Ok(built.clone()))
+    }
 }
 
 pub(super) fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
@@ -118,10 +126,7 @@ impl PreparedView {
     ) -> Result<Self> {
         let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
         check_contexts(gpu, inputs)?;
-        let built = match inputs.built {
-            Some(built) => built.clone(),
-            None => pyramid.built_for(camera)?,
-        };
+        let built = inputs.built()?;
         // Bad options are refused before anything is recorded.
         let mut view = ViewUniform {
             source_origin: packed(built.part.origin),
@@ -159,7 +164,7 @@ impl PreparedView {
         };
         let store = if atlas.is_some() {
             DepthStore::Atlas
-        } else if built.all.is_some() {
+        } else if built.in_place.is_some() {
             DepthStore::Made
         } else {
             DepthStore::Apart(built.part.kind)
@@ -195,7 +200,8 @@ impl PreparedView {
         let views = [self.view, ViewUniform { descent_budget, ..self.view }];
         let parts = views.each_ref().map(bytemuck::bytes_of);
         let texture = self.atlas.as_ref().unwrap_or(&self.built.source).clone();
-        let buffer = self.built.all.as_ref().map(|made| made.buffer().clone());
+        let in_place = self.built.in_place.as_ref().map(|all| &all.buffer);
+        let buffer = in_place.map(|made| made.buffer().clone());
         let key = (self.key.store.code(), texture, self.built.nearest.clone(), buffer);
         let bound = pyramid.view.bind(gpu, &key, &parts[..1 + usize::from(grouped)], |view| {
             self.create(gpu, pyramid, view)
@@ -203,7 +209,7 @@ impl PreparedView {
         let BoundParts { mut parts, numbers } = bound;
         let groups = parts.split_off(1).pop();
         let instances = parts.swap_remove(0);
-        Ok(BoundView { instances, groups, numbers, made: self.built.all.clone() })
+        Ok(BoundView { instances, groups, numbers, made: in_place.cloned() })
     }
 
     fn create(
@@ -216,8 +222,8 @@ impl PreparedView {
         let chunks;
         if let Some(atlas) = &self.atlas {
             entries.push(entry(3, wgpu::BindingResource::TextureView(atlas)));
-        } else if let Some(made) = &self.built.all {
-            entries.push(entry(3, made.buffer().as_entire_binding()));
+        } else if let Some(all) = &self.built.in_place {
+            entries.push(entry(3, all.buffer.buffer().as_entire_binding()));
         } else {
             chunks = [pyramid.chunk(gpu, 0)?, pyramid.chunk(gpu, 1)?, pyramid.chunk(gpu, 2)?];
             entries.push(entry(0, wgpu::BindingResource::TextureView(&self.built.source)));

@@ -3,7 +3,7 @@
 //! A group that is hidden as a whole tells nothing about its members' pixels, so they are counted
 //! all the same.
 
-use crate::cull::inputs::{BoundView, CullInputs, PreparedView};
+use crate::cull::inputs::{BoundView, CullInputs, PreparedView, check_contexts};
 use crate::cull::pipelines::{
     CullKey, Decision, DepthStore, classify_constants, layouts, unexplained,
 };
@@ -295,7 +295,9 @@ impl PixelPass {
         }
         check_no_shadow(inputs.options, "counts of pixels")?;
         let CullInputs { instances, pyramid, .. } = *inputs;
-        let seen = PreparedView::new(gpu, inputs, None)?;
+        check_contexts(gpu, inputs)?;
+        let built = inputs.built()?.by_texture();
+        let seen = PreparedView::new(gpu, &CullInputs { built: Some(&built), ..*inputs }, None)?;
         let view = seen.bind(gpu, pyramid, false)?;
         let flags = (seen.has_one_sample(), negligible.is_some());
         let size = pyramid.size();

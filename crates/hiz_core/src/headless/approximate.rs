@@ -47,6 +47,7 @@ impl Engine {
     ) -> Result<ApproximateCulling> {
         self.check_process()?;
         let gpu = &self.context().gpu;
+        self.bring_image_of(pyramid);
         let (counted, among) = self.scoped(|| {
             let counted = Arc::new(counted(gpu, instances)?);
             let among = Arc::new(Among::new(gpu, instances)?);

@@ -17,6 +17,7 @@ use crate::occluders::depth::OccluderDepth;
 use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
 use crate::occluders::surface::ConservativeDepthOptions;
 use crate::occluders::uploaded::Occluders;
+use crate::pyramid::Pyramid;
 use crate::pyramid::built::Owner;
 use crate::pyramid::ends::Depths;
 use crate::pyramid::host_levels::HostLevels;
@@ -358,6 +359,18 @@ impl Engine {
             levels.record_image(&mut encoder);
             self.queue().submit([encoder.finish()]);
             levels.image_has_come();
+        }
+    }
+
+    /// The same for the image of a pyramid.
+    ///
+    /// Counts of pixels read so much of it that they gain by it, too.
+    pub(super) fn bring_image_of(&self, pyramid: &Pyramid) {
+        // One of another device is refused by whoever reads it.
+        let is_ours = pyramid.context == self.context().gpu.id();
+        let built = is_ours.then(|| pyramid.built()).flatten();
+        if let Some(owner) = built.and_then(|built| built.owner) {
+            self.bring_image(&*owner);
         }
     }
 

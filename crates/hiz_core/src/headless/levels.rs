@@ -65,7 +65,7 @@ impl Engine {
             pyramid.keep_with_it(Arc::clone(drawn) as Arc<dyn Owner>);
         }
         self.queue().submit([encoder.finish()]);
-        if pyramid.built().is_some_and(|built| built.all.is_none()) {
+        if pyramid.built().is_some_and(|built| built.in_place.is_none()) {
             levels.inspect(|levels| levels.image_has_come());
         }
         Ok(())
@@ -128,9 +128,7 @@ impl Engine {
                     ),
                 ));
             }
-            if let Some(owner) = &built.owner {
-                self.bring_image(&**owner);
-            }
+            self.bring_image_of(pyramid);
             let [x, y] = part.origin.map(u64::from);
             let crop = readback::Crop {
                 skip: 4 * x,

@@ -56,9 +56,7 @@ impl Engine {
             ..DepthSource::from(&of.texture)
         };
         self.scoped(|| {
-            if let Some(owner) = &built.owner {
-                self.bring_image(&**owner);
-            }
+            self.bring_image_of(pyramid);
             let mips = MipTexture::new(gpu, pyramid.size(), options)?;
             let _in_order = pyramid.submitting.lock();
             let mut encoder = self.encoder("hiz.mips.encoder");

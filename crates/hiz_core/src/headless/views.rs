@@ -225,6 +225,9 @@ impl Engine {
         let visible: Vec<&Visible> = visible.iter().map(Arc::as_ref).collect();
         let of_views: Vec<_> =
             views.iter().map(|(camera, pyramid)| View { camera, pyramid }).collect();
+        if outputs.pixels {
+            views.iter().for_each(|(_, pyramid)| self.bring_image_of(pyramid));
+        }
         let mut encoder = self.encoder("hiz.views.encoder");
         let inputs = ViewsInputs {
             instances,

@@ -86,7 +86,7 @@ impl Engine {
         };
         let pyramid = self.warm_up_frame(instances, &depth, levels, options, outputs, more)?;
         if let Some(occluders) = occluders
-            && pyramid.built().is_some_and(|built| built.all.is_some())
+            && pyramid.built().is_some_and(|built| built.in_place.is_some())
         {
             // An image to which more was added is read in its texture.
             let add = DrawOptions { load: DepthLoad::Load, ..DrawOptions::default() };

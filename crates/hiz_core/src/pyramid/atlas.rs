@@ -39,8 +39,8 @@ pub enum AtlasUse {
     /// Where a cull has enough instances for the copy to pay.
     ///
     /// That takes a quarter as many instances as the depth image and the stored levels have texels.
-    /// Where culls can read all of them in the buffer in which the host has made them, it takes as
-    /// many instances with a footprint of 2x2, and with a larger one fewer.
+    /// Where culls can read all of them in the buffer in which the host has made them, it takes half
+    /// as many instances with a footprint of 2x2, and with a larger one fewer.
     #[default]
     Auto,
     /// Whatever the number of instances.
@@ -93,14 +93,14 @@ pub(crate) fn travels(format: wgpu::TextureFormat) -> bool {
 impl AtlasUse {
     /// Whether culls of `instances` instances ask for an atlas.
     ///
-    /// Copying a pixel costs about a quarter of what the atlas saves per instance, or as much as it
+    /// Copying a pixel costs about a quarter of what the atlas saves per instance, or half of what it
     /// saves for a footprint of 2x2 where all levels are in one buffer (`docs/performance.md`).
     pub(crate) fn pays(self, layout: &PyramidLayout, readers: Readers) -> bool {
         let copied = layout.size.pixels() + layout.texels;
         let Readers { instances, footprint_log2, in_one_buffer } = readers;
         let instances = u64::from(instances);
         match self {
-            Self::Auto if in_one_buffer => instances << (2 * footprint_log2) >= 4 * copied,
+            Self::Auto if in_one_buffer => instances << (2 * footprint_log2) >= 2 * copied,
             Self::Auto => 4 * instances >= copied,
             Self::Always => true,
             Self::Never => false,
@@ -156,10 +156,10 @@ impl Atlas {
         let texels = source.texels();
         let extent =
             wgpu::Extent3d { width: texels.width, height: texels.height, depth_or_array_layers: 1 };
-        let made = built.all.as_ref().zip(layout.image());
+        let made = built.in_place.as_ref().zip(layout.image());
         // Everything that can fail comes before the first command is recorded.
         let staging = if format == FORMAT { None } else { Some(self.staging_or_new(gpu, layout)?) };
-        let stored = made.map_or(stored, |(made, _)| made.read_by(encoder));
+        let stored = made.map_or(stored, |(made, _)| made.buffer.read_by(encoder));
         let of_image = gpu.numbers(bytemuck::cast_slice(&[built.reduction, 0, 0, 0]))?;
         of_image.record_with(encoder, |encoder, of_image| {
             for (column, buffer) in (layout.atlas.width - HEADERS..).zip([of_image, stored]) {

@@ -3,11 +3,11 @@
 //! It is a file of its own because both the reduction and the atlas need it.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
-use crate::gpu::kept::Lent;
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
-use crate::pyramid::host_levels::HostLevels;
+use crate::pyramid::host_levels::{HostLevels, InPlace};
 use crate::pyramid::source::Part;
 
 /// What a depth image was drawn with: while it is alive, the image is not drawn again.
@@ -32,8 +32,17 @@ pub(crate) struct Built {
     /// Where the image lies in its texture, and what was rounded in it: every cull counts that.
     pub(crate) part: Part,
     pub(crate) camera: Camera,
-    /// All levels and the image in one buffer, if the host has made them there.
-    pub(crate) all: Option<Arc<Lent>>,
+    /// Where culls may read in place of pyramid and image, if the host has made both.
+    pub(crate) in_place: Option<InPlace>,
     /// Keeps the image as it is for those who read it later.
     pub(crate) owner: Option<Arc<dyn Owner>>,
+}
+
+impl Built {
+    /// The same for those who read many pixels: a texture gives four of them at once.
+    pub(crate) fn by_texture(self) -> Self {
+        let is_there = |all: &InPlace| all.is_in_texture.load(Ordering::Acquire);
+        let in_place = self.in_place.filter(|all| !is_there(all));
+        Self { in_place, ..self }
+    }
 }

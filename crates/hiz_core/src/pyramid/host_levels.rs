@@ -79,7 +79,22 @@ struct Made {
     convention: DepthConvention,
     /// The number, the levels behind it, and the image if it stays there.
     staging: Arc<Lent>,
-    is_in_texture: bool,
+    /// Whether the copy of the image to its texture was submitted.
+    is_in_texture: Arc<AtomicBool>,
+}
+
+impl Made {
+    fn is_in_texture(&self) -> bool {
+        self.is_in_texture.load(Ordering::Acquire)
+    }
+}
+
+/// All levels and the image in one buffer, in which the host has made them.
+#[derive(Debug, Clone)]
+pub(crate) struct InPlace {
+    pub(crate) buffer: Arc<Lent>,
+    /// Whether a copy of the image to its texture was submitted, too.
+    pub(crate) is_in_texture: Arc<AtomicBool>,
 }
 
 /// A copy from one buffer to another, in bytes.
@@ -96,18 +111,13 @@ pub(super) struct Copied<'a> {
     drawn: &'a wgpu::Buffer,
     levels: Arc<Lent>,
     copies: Vec<LevelCopy>,
-    /// Whether the buffer of the levels has all that culls read, where they look for it.
-    is_all: bool,
+    /// Where culls may read in place of pyramid and image.
+    pub(super) in_place: Option<InPlace>,
     /// The number that the pyramid then begins with.
     pub(super) number: u32,
 }
 
 impl Copied<'_> {
-    /// The buffer that culls may read in place of the pyramid and the image.
-    pub(super) fn all(&self) -> Option<&Arc<Lent>> {
-        self.is_all.then_some(&self.levels)
-    }
-
     /// Records the copies into the only chunk of a pyramid.
     pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, chunk: &wgpu::Buffer) {
         encoder.copy_buffer_to_buffer(self.drawn, 0, chunk, 0, HEADER_BYTES);
@@ -214,7 +224,7 @@ impl HostLevels {
 
     /// Whether the last drawing is not in the texture yet.
     pub(crate) fn holds_image(&self) -> bool {
-        self.made.lock().as_ref().is_some_and(|made| !made.is_in_texture)
+        self.made.lock().as_ref().is_some_and(|made| !made.is_in_texture())
     }
 
     /// Records the copy of the image to its texture, if the last drawing has not made it.
@@ -222,7 +232,7 @@ impl HostLevels {
     /// The commands that read the texture come behind it, and no drawing is submitted in between.
     /// So whoever keeps the order of drawings keeps that of this copy, too.
     pub(crate) fn record_image(&self, encoder: &mut wgpu::CommandEncoder) {
-        let made = self.made.lock().clone().filter(|made| !made.is_in_texture);
+        let made = self.made.lock().clone().filter(|made| !made.is_in_texture());
         let Some((Made { staging, .. }, image)) = made.zip(self.image) else { return };
         let buffer = staging.read_by(encoder);
         encoder.copy_buffer_to_texture(
@@ -241,8 +251,8 @@ impl HostLevels {
 
     /// Notes that the copy of the image was submitted, and no drawing since it was recorded.
     pub(crate) fn image_has_come(&self) {
-        if let Some(made) = &mut *self.made.lock() {
-            made.is_in_texture = true;
+        if let Some(made) = &*self.made.lock() {
+            made.is_in_texture.store(true, Ordering::Release);
         }
     }
 
@@ -260,9 +270,12 @@ impl HostLevels {
         let copies = copies(&self.layout, layout)?;
         self.are_wanted.store(true, Ordering::Relaxed);
         let made = self.made.lock().clone().filter(|made| made.convention == convention)?;
-        let Made { number, staging: levels, .. } = made;
-        let is_all = self.image.is_some() && self.layout.levels == layout.levels;
-        Some(Copied { drawn: self.drawn.get()?, levels, copies, is_all, number })
+        let Made { number, staging: levels, is_in_texture, .. } = made;
+        // Culls look where the pyramid's own layout has the levels and the image.
+        let is_there = self.layout.levels == layout.levels && self.image == layout.image();
+        let in_place = (is_there && self.image.is_some())
+            .then(|| InPlace { buffer: Arc::clone(&levels), is_in_texture });
+        Some(Copied { drawn: self.drawn.get()?, levels, copies, in_place, number })
     }
 }
 
@@ -381,7 +394,7 @@ impl LevelRows<'_> {
             encoder.copy_buffer_to_buffer(staging.read_by(encoder), 0, drawn, 0, HEADER_BYTES);
             Ok(())
         })?;
-        let is_in_texture = levels.image.is_none();
+        let is_in_texture = Arc::new(AtomicBool::new(levels.image.is_none()));
         *levels.made.lock() = Some(Made { number, convention, staging, is_in_texture });
         Ok(())
     }

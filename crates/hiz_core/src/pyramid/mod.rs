@@ -284,7 +284,7 @@ impl Pyramid {
         self.layout.levels.get(level as usize).map(|l| ImageSize::new(l.width, l.height))
     }
 
-    /// Bytes on the device, including an atlas and excluding the depth texture.
+    /// Bytes on the device, including an atlas and excluding the depth image, wherever it is.
     pub fn device_bytes(&self) -> u64 {
         let atlas = self.atlas.lock();
         let atlas = atlas.as_ref().map_or(0, Atlas::bytes);
@@ -301,7 +301,7 @@ impl Pyramid {
         built: &Built,
         (instances, footprint_log2): (u32, u32),
     ) -> bool {
-        let in_one_buffer = built.all.is_some();
+        let in_one_buffer = built.in_place.is_some();
         self.atlas_use.pays(&self.layout, Readers { instances, footprint_log2, in_one_buffer })
             && !self.no_atlas.load(Ordering::Relaxed)
             && atlas::is_possible(&self.layout, &built.part, gpu.limits())
@@ -416,7 +416,7 @@ impl Pyramid {
     /// Whether culls may read all levels and the image in the buffer that the host has written.
     #[cfg(feature = "testing")]
     pub fn is_in_one_buffer(&self) -> bool {
-        self.built().is_some_and(|built| built.all.is_some())
+        self.built().is_some_and(|built| built.in_place.is_some())
     }
 
     /// The buffer of chunk `i`, or a stand-in if the pyramid has fewer chunks.

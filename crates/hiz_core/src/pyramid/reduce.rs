@@ -171,7 +171,7 @@ impl Prepared {
             nearest,
             part,
             camera,
-            all: None,
+            in_place: None,
             owner: None,
         };
         let dispatch = |(step, blocks): (&Step, &Blocks)| {
@@ -255,7 +255,7 @@ pub(crate) fn record_reduce(
         })
     };
     if let Some(levels) = levels {
-        if levels.all().is_none() {
+        if levels.in_place.is_none() {
             bring_image(encoder)?;
         }
         return record_copies(gpu, encoder, (part, camera), pyramid, &levels);
@@ -284,8 +284,9 @@ fn record_copies(
         levels.record(encoder, &pyramid.chunks[0]);
         Ok(())
     })?;
-    let (camera, reduction, all) = (camera.clone(), levels.number, levels.all().cloned());
-    note(encoder, pyramid, Built { reduction, source, nearest, part, camera, all, owner: None });
+    let (camera, reduction, in_place) = (camera.clone(), levels.number, levels.in_place.clone());
+    let built = Built { reduction, source, nearest, part, camera, in_place, owner: None };
+    note(encoder, pyramid, built);
     #[cfg(feature = "testing")]
     pyramid.are_copied.store(true, Ordering::Relaxed);
     Ok(())
