@@ -195,7 +195,7 @@ impl PreparedView {
         let views = [self.view, ViewUniform { descent_budget, ..self.view }];
         let parts = views.each_ref().map(bytemuck::bytes_of);
         let texture = self.atlas.as_ref().unwrap_or(&self.built.source).clone();
-        let buffer = self.built.all.as_ref().map(|made| made.buffer().clone());
+        let buffer = self.made().map(|made| made.buffer().clone());
         let key = (self.key.store.code(), texture, self.built.nearest.clone(), buffer);
         let bound = pyramid.view.bind(gpu, &key, &parts[..1 + usize::from(grouped)], |view| {
             self.create(gpu, pyramid, view)
@@ -203,7 +203,12 @@ impl PreparedView {
         let BoundParts { mut parts, numbers } = bound;
         let groups = parts.split_off(1).pop();
         let instances = parts.swap_remove(0);
-        Ok(BoundView { instances, groups, numbers, made: self.built.all.clone() })
+        Ok(BoundView { instances, groups, numbers, made: self.made().cloned() })
+    }
+
+    /// The buffer that is read in place of pyramid and image, if no atlas is read.
+    fn made(&self) -> Option<&Arc<Lent>> {
+        self.built.all.as_ref().filter(|_| self.key.store == DepthStore::Made)
     }
 
     fn create(
@@ -216,7 +221,7 @@ impl PreparedView {
         let chunks;
         if let Some(atlas) = &self.atlas {
             entries.push(entry(3, wgpu::BindingResource::TextureView(atlas)));
-        } else if let Some(made) = &self.built.all {
+        } else if let Some(made) = self.made() {
             entries.push(entry(3, made.buffer().as_entire_binding()));
         } else {
             chunks = [pyramid.chunk(gpu, 0)?, pyramid.chunk(gpu, 1)?, pyramid.chunk(gpu, 2)?];
