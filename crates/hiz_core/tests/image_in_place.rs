@@ -174,28 +174,35 @@ fn mask_of(engine: &Engine, depth: &DepthImage, options: &PyramidOptions) -> Vec
     culling.mask().unwrap().into_iter().map(u32::from).collect()
 }
 
-const READERS: [Reader; 11] = [
+/// The pixels in the texture of an image, whose rows have a multiple of 256 bytes.
+fn words_of_texture(engine: &Engine, texture: &wgpu::Texture) -> Vec<u32> {
+    let bytes = 16 * u64::from(texture.width()) * u64::from(texture.height());
+    let buffer = engine.device().create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: bytes,
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+        mapped_at_creation: false,
+    });
+    let mut copy = engine.device().create_command_encoder(&Default::default());
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(16 * texture.width()),
+        rows_per_image: None,
+    };
+    let into = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+    copy.copy_texture_to_buffer(texture.as_image_copy(), into, texture.size());
+    engine.queue().submit([copy.finish()]);
+    words_of(engine, &buffer)
+}
+
+/// A pyramid whose levels fit a binding that does not hold the image, too.
+fn narrow(atlas: AtlasUse) -> PyramidOptions {
+    PyramidOptions { atlas, chunk_shift: Some(13), ..Default::default() }
+}
+
+const READERS: [Reader; 13] = [
     ("read", |_, depth| bits(depth.read().unwrap())),
-    ("texture", |engine, depth| {
-        let texture = depth.texture();
-        let bytes = 16 * u64::from(texture.width()) * u64::from(texture.height());
-        let buffer = engine.device().create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: bytes,
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        let mut copy = engine.device().create_command_encoder(&Default::default());
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(16 * texture.width()),
-            rows_per_image: None,
-        };
-        let into = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
-        copy.copy_texture_to_buffer(texture.as_image_copy(), into, texture.size());
-        engine.queue().submit([copy.finish()]);
-        words_of(engine, &buffer)
-    }),
+    ("texture", |engine, depth| words_of_texture(engine, depth.texture())),
     ("level 0", |engine, depth| levels_of(engine, depth, &PyramidOptions::default())),
     ("both ends", |engine, depth| {
         levels_of(engine, depth, &PyramidOptions { depths: Depths::Both, ..Default::default() })
@@ -213,6 +220,10 @@ const READERS: [Reader; 11] = [
     ("chunks", |engine, depth| {
         mask_of(engine, depth, &PyramidOptions { chunk_shift: Some(12), ..Default::default() })
     }),
+    ("a chunk without room for the image", |engine, depth| {
+        mask_of(engine, depth, &narrow(AtlasUse::Never))
+    }),
+    ("the same beside an atlas", |engine, depth| mask_of(engine, depth, &narrow(AtlasUse::Always))),
     ("mips", |engine, depth| {
         let pyramid = engine.pyramid(depth).unwrap();
         let options = MipOptions { depths: MipDepths::Farthest, ..Default::default() };

@@ -261,7 +261,10 @@ impl HostLevels {
         self.are_wanted.store(true, Ordering::Relaxed);
         let made = self.made.lock().clone().filter(|made| made.convention == convention)?;
         let Made { number, staging: levels, .. } = made;
-        let is_all = self.image.is_some() && self.layout.levels == layout.levels;
+        // Culls look for the image where the pyramid's own layout has it.
+        let is_all = self.image.is_some()
+            && self.image == layout.image()
+            && self.layout.levels == layout.levels;
         Some(Copied { drawn: self.drawn.get()?, levels, copies, is_all, number })
     }
 }
