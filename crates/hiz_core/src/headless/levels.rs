@@ -129,7 +129,10 @@ impl Engine {
                 ));
             }
             if let Some(owner) = &built.owner {
-                self.bring_image(&**owner);
+                self.scoped(|| {
+                    self.bring_image(&**owner);
+                    Ok(())
+                })?;
             }
             let [x, y] = part.origin.map(u64::from);
             let crop = readback::Crop {
