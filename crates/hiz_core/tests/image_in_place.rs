@@ -6,6 +6,7 @@
 mod common;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use common::{BLOCK_SIZES, CONVENTIONS, Random, camera_along_z, engine, words_of};
 use hiz_core::headless::{Culling, DepthImage, Engine};
@@ -189,28 +190,35 @@ fn mask_of(engine: &Engine, depth: &DepthImage, options: &PyramidOptions) -> Vec
     culling.mask().unwrap().into_iter().map(u32::from).collect()
 }
 
-const READERS: [Reader; 11] = [
+/// The pixels in the texture of an image, whose rows have a multiple of 256 bytes.
+fn words_of_texture(engine: &Engine, texture: &wgpu::Texture) -> Vec<u32> {
+    let bytes = 16 * u64::from(texture.width()) * u64::from(texture.height());
+    let buffer = engine.device().create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: bytes,
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+        mapped_at_creation: false,
+    });
+    let mut copy = engine.device().create_command_encoder(&Default::default());
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(16 * texture.width()),
+        rows_per_image: None,
+    };
+    let into = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+    copy.copy_texture_to_buffer(texture.as_image_copy(), into, texture.size());
+    engine.queue().submit([copy.finish()]);
+    words_of(engine, &buffer)
+}
+
+/// A pyramid whose levels fit a binding that does not hold the image, too.
+fn narrow(atlas: AtlasUse) -> PyramidOptions {
+    PyramidOptions { atlas, chunk_shift: Some(13), ..Default::default() }
+}
+
+const READERS: [Reader; 13] = [
     ("read", |_, depth| bits(depth.read().unwrap())),
-    ("texture", |engine, depth| {
-        let texture = depth.texture();
-        let bytes = 16 * u64::from(texture.width()) * u64::from(texture.height());
-        let buffer = engine.device().create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: bytes,
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        let mut copy = engine.device().create_command_encoder(&Default::default());
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(16 * texture.width()),
-            rows_per_image: None,
-        };
-        let into = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
-        copy.copy_texture_to_buffer(texture.as_image_copy(), into, texture.size());
-        engine.queue().submit([copy.finish()]);
-        words_of(engine, &buffer)
-    }),
+    ("texture", |engine, depth| words_of_texture(engine, depth.texture())),
     ("level 0", |engine, depth| levels_of(engine, depth, &PyramidOptions::default())),
     ("both ends", |engine, depth| {
         levels_of(engine, depth, &PyramidOptions { depths: Depths::Both, ..Default::default() })
@@ -228,6 +236,10 @@ const READERS: [Reader; 11] = [
     ("chunks", |engine, depth| {
         mask_of(engine, depth, &PyramidOptions { chunk_shift: Some(12), ..Default::default() })
     }),
+    ("a chunk without room for the image", |engine, depth| {
+        mask_of(engine, depth, &narrow(AtlasUse::Never))
+    }),
+    ("the same beside an atlas", |engine, depth| mask_of(engine, depth, &narrow(AtlasUse::Always))),
     ("mips", |engine, depth| {
         let pyramid = engine.pyramid(depth).unwrap();
         let options = MipOptions { depths: MipDepths::Farthest, ..Default::default() };
@@ -294,6 +306,38 @@ fn more_is_drawn_into_an_image_that_is_not_in_its_texture() {
         });
         assert!(here == there, "{is_reduced}");
     }
+}
+
+/// A texture that was handed out has each later drawing, one that came at the same time as well.
+#[test]
+fn a_texture_that_is_handed_out_keeps_up_with_drawings() {
+    let engine = &*engine();
+    let camera = camera_along_z(64, 8, DepthConvention::Reversed);
+    let walls = [8.0, 4.0].map(|z| wall(engine, z));
+    let sizes = [1800, 1801, 1802].map(|side| camera_along_z(side, side, camera.convention()));
+    let is_done = &AtomicBool::new(false);
+    let rounds = 300 * common::soak_times();
+    std::thread::scope(|scope| {
+        // Images that give way to others slow down whoever notes that an image is not lent again.
+        scope.spawn(|| {
+            let others = sizes.iter().cycle().take(20 * rounds);
+            for other in others.take_while(|_| !is_done.load(Ordering::Relaxed)) {
+                drawn(engine, &walls[0], other);
+            }
+        });
+        for round in 0..rounds {
+            let depth = drawn(engine, &walls[0], &camera);
+            engine.pyramid(&depth).unwrap();
+            let (same, wall, all) = (depth.clone(), &walls[1], DrawOptions::default());
+            let drawing = scope.spawn(move || engine.render_depth_into(&same, wall, &all));
+            let texture = depth.texture();
+            drawing.join().unwrap().unwrap();
+            let found = words_of_texture(engine, texture);
+            let is_last = found.iter().all(|word| f32::from_bits(*word) == 0.25);
+            is_done.fetch_or(!is_last || round + 1 == rounds, Ordering::Relaxed);
+            assert!(is_last, "round {round}: {}", f32::from_bits(found[0]));
+        }
+    });
 }
 
 /// A buffer is written again only when no pyramid and no cull on its way reads it.

@@ -47,8 +47,8 @@ impl Engine {
     ) -> Result<ApproximateCulling> {
         self.check_process()?;
         let gpu = &self.context().gpu;
-        self.bring_image_of(pyramid);
         let (counted, among) = self.scoped(|| {
+            self.bring_image_of(pyramid);
             let counted = Arc::new(counted(gpu, instances)?);
             let among = Arc::new(Among::new(gpu, instances)?);
             let inputs = CullInputs::new(instances, camera, pyramid, options);

@@ -191,10 +191,10 @@ impl Engine {
         self.check_process()?;
         let Question { instances, camera, pyramid, options, .. } = *question;
         let gpu = &self.context().gpu;
-        if outputs.pixels {
-            self.bring_image_of(pyramid);
-        }
         let mut attempt = || {
+            if outputs.pixels {
+                self.bring_image_of(pyramid);
+            }
             let (start, made_before) = (Instant::now(), PipelinesMade::so_far());
             let buffers = self.answers().lend(self.context(), instances, outputs)?;
             let visible = Arc::clone(&buffers.visible);

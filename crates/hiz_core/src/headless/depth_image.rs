@@ -83,11 +83,15 @@ impl DepthImage {
     /// Images from [`Engine::upload_depth`], and those that the host has drawn, hold four pixels per
     /// texel (`Rgba32Uint`).
     pub fn texture(&self) -> &wgpu::Texture {
-        if let Some(drawn) = &self.drawn {
-            self.engine.bring_image(&**drawn);
+        if let Some(drawn) = self.drawn.as_ref().filter(|_| self.engine.check_process().is_ok()) {
             self.engine.images().keep_apart(drawn);
-            // The caller may write into the texture, too.
-            drawn.levels().inspect(|levels| levels.turn_off());
+            // From here to the end no drawing is submitted, or its image would stay on the host.
+            let _in_order = drawn.submitting.lock();
+            if let Some(levels) = drawn.levels() {
+                self.engine.bring_in_order(levels);
+                // The caller may write into the texture, too.
+                levels.turn_off();
+            }
         }
         &self.texture
     }
@@ -131,11 +135,11 @@ impl DepthImage {
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn read(&self) -> Result<Vec<f32>> {
         let engine = &self.engine;
-        if let Some(drawn) = &self.drawn {
-            engine.bring_image(&**drawn);
-        }
         let row = 4 * u64::from(self.size().width);
         let bytes = engine.scoped(|| {
+            if let Some(drawn) = &self.drawn {
+                engine.bring_image(&**drawn);
+            }
             readback::read_texture(engine.device(), engine.queue(), &self.texture, row)
         })?;
         memory::collected(to_u32(&bytes).map(f32::from_bits), "depth")
@@ -350,10 +354,15 @@ impl DepthImage {
 impl Engine {
     /// Brings an image that occluders were drawn into to its texture, if it is not there yet.
     ///
-    /// Whoever reads the texture calls this before.
+    /// Whoever reads the texture calls this before, within [`Engine::scoped`].
     pub(super) fn bring_image(&self, drawn: &dyn Owner) {
         let Some(levels) = drawn.levels() else { return };
         let _in_order = drawn.submitting().lock();
+        self.bring_in_order(levels);
+    }
+
+    /// The same for those who hold [`Owner::submitting`].
+    fn bring_in_order(&self, levels: &HostLevels) {
         if levels.holds_image() {
             let mut encoder = self.encoder("hiz.depth.encoder");
             levels.record_image(&mut encoder);

@@ -128,7 +128,10 @@ impl Engine {
                     ),
                 ));
             }
-            self.bring_image_of(pyramid);
+            self.scoped(|| {
+                self.bring_image_of(pyramid);
+                Ok(())
+            })?;
             let [x, y] = part.origin.map(u64::from);
             let crop = readback::Crop {
                 skip: 4 * x,

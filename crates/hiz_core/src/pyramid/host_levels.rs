@@ -160,7 +160,12 @@ impl HostLevels {
     /// Makes none from now on, because the image may hold what was not drawn.
     pub(crate) fn turn_off(&self) {
         self.are_off.store(true, Ordering::Relaxed);
-        *self.made.lock() = None;
+        self.let_go();
+    }
+
+    /// Lets go of what the last drawing has made, unless its image is nowhere else.
+    fn let_go(&self) {
+        self.made.lock().take_if(|made| made.is_in_texture());
     }
 
     /// Begins those of a drawing of the whole image; `None` if nobody wants them.
@@ -173,7 +178,8 @@ impl HostLevels {
         gpu: &Gpu,
         convention: DepthConvention,
     ) -> Result<Option<LevelRows<'_>>> {
-        *self.made.lock() = None;
+        // An image stays as it was if the next drawing fails.
+        self.let_go();
         if self.are_off.load(Ordering::Relaxed) || !self.are_wanted.swap(false, Ordering::Relaxed) {
             return Ok(None);
         }
@@ -214,12 +220,16 @@ impl HostLevels {
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid) for an encoder with an open pass.
     pub(crate) fn retract(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
+        // As in `begin`.
+        self.let_go();
+        if let Some(drawn) = self.drawn.get() {
+            gpu.recorded(|| {
+                encoder.clear_buffer(drawn, 0, None);
+                Ok(())
+            })?;
+        }
         *self.made.lock() = None;
-        let Some(drawn) = self.drawn.get() else { return Ok(()) };
-        gpu.recorded(|| {
-            encoder.clear_buffer(drawn, 0, None);
-            Ok(())
-        })
+        Ok(())
     }
 
     /// Whether the last drawing is not in the texture yet.
