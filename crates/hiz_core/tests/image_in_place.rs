@@ -69,7 +69,8 @@ fn uploaded(engine: &Engine, depth: &DepthImage) -> DepthImage {
 
 /// Whether images stay where the host has written them.
 fn is_processor(engine: &Engine) -> bool {
-    engine.device().adapter_info().device_type == wgpu::DeviceType::Cpu
+    let info = engine.device().adapter_info();
+    info.device_type == wgpu::DeviceType::Cpu && info.backend == wgpu::Backend::Vulkan
 }
 
 fn instances(engine: &Engine, kind: BoundsKind, count: usize) -> Arc<Instances> {

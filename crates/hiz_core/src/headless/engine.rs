@@ -164,8 +164,10 @@ impl Engine {
             return Err(adapter::no_adapter(request, &seen));
         };
         let mut wanted = wgpu::Features::INDIRECT_FIRST_INSTANCE | wgpu::Features::TIMESTAMP_QUERY;
-        if adapter.get_info().device_type == wgpu::DeviceType::Cpu {
-            // What the host draws is read in place (`Gpu::reads_mapped`).
+        let info = adapter.get_info();
+        // What the host draws is read in place there (`Gpu::reads_mapped`).
+        // The heaps of other backends may allow no such buffer that is written by the host.
+        if info.device_type == wgpu::DeviceType::Cpu && info.backend == wgpu::Backend::Vulkan {
             wanted |= wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
         }
         let features = adapter.features() & wanted;
@@ -173,7 +175,7 @@ impl Engine {
             label: Some("hiz.device"),
             required_features: features,
             required_limits: adapter.limits(),
-            memory_hints: memory_hints(&adapter.get_info()),
+            memory_hints: memory_hints(&info),
             ..Default::default()
         }))
         .map_err(|e| adapter::no_adapter(format!("would open: {summary}: {e}"), &seen))?;
