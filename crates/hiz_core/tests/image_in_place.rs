@@ -386,28 +386,40 @@ fn a_recorded_cull_holds_what_it_reads() {
     let engine = &*engine();
     let camera = camera_along_z(132, 70, DepthConvention::Reversed);
     let boxes = instances(engine, BoundsKind::Box, 500);
-    let (how, outputs) = (CullOptions::default(), Outputs::default());
-    let frame = |scene: &Occluders| {
-        let depth = drawn(engine, scene, &camera);
-        pyramid(engine, &depth, StoredLevels::ALL)
-    };
+    let how = CullOptions::default();
     let (first, other) = (triangles(engine, 70, 12), triangles(engine, 71, 3));
-    let expected =
-        engine.cull(&boxes, &camera, &frame(&first), &how, &outputs).unwrap().mask().unwrap();
-    let visible = engine.context().create_visible(&boxes, &outputs).unwrap();
-    let mut late = engine.device().create_command_encoder(&Default::default());
-    let here = frame(&first);
-    engine.context().record_cull(&mut late, &boxes, &camera, &here, &visible, &how).unwrap();
-    drop(here);
-    let late = late.finish();
-    for _ in 0..6 {
-        engine.wait().unwrap();
-        frame(&other);
+    // Counts of pixels, and culls with other levels, read the texture.
+    for (levels, pixels) in
+        [(StoredLevels::ALL, false), (StoredLevels::ALL, true), (StoredLevels::from(2), false)]
+    {
+        let outputs = Outputs { pixels, ..Outputs::default() };
+        let frame = |scene: &Occluders| {
+            let depth = drawn(engine, scene, &camera);
+            pyramid(engine, &depth, levels)
+        };
+        let here = frame(&first);
+        let at_once = engine.cull(&boxes, &camera, &here, &how, &outputs).unwrap();
+        let (expected, counts) = (at_once.mask().unwrap(), pixels.then(|| at_once.pixels()));
+        let counts = counts.transpose().unwrap();
+        let visible = engine.context().create_visible(&boxes, &outputs).unwrap();
+        let mut late = engine.device().create_command_encoder(&Default::default());
+        engine.context().record_cull(&mut late, &boxes, &camera, &here, &visible, &how).unwrap();
+        drop((here, at_once));
+        let late = late.finish();
+        for _ in 0..6 {
+            engine.wait().unwrap();
+            // Images that come to their textures.
+            engine.mips(&frame(&other), &MipOptions::default()).unwrap();
+        }
+        engine.queue().submit([late]);
+        let words = words_of(engine, visible.mask(0).expect("a mask"));
+        let is_kept = |i: usize| words[i / 32] >> (i % 32) & 1 == 1;
+        let found: Vec<_> = (0..expected.len()).map(is_kept).collect();
+        assert!(found == expected, "{levels:?}");
+        let words = visible.pixels(0).map(|counts| words_of(engine, counts));
+        let found = words.as_ref().map(|words| &words[..5 * boxes.len() as usize]);
+        assert!(found == counts.as_ref().map(|counts| bytemuck::cast_slice(counts)));
     }
-    engine.queue().submit([late]);
-    let words = words_of(engine, visible.mask(0).expect("a mask"));
-    let found: Vec<_> = (0..expected.len()).map(|i| words[i / 32] >> (i % 32) & 1 == 1).collect();
-    assert!(found == expected);
 }
 
 /// Images that take turns share the buffers that their rows are written into.

@@ -57,12 +57,10 @@ impl HizContext {
         visible: &Visible,
         options: &CullOptions,
     ) -> Result<()> {
-        record_cull(
-            &self.gpu,
-            encoder,
-            &CullInputs::new(instances, camera, pyramid, options),
-            visible,
-        )
+        let inputs = CullInputs::new(instances, camera, pyramid, options);
+        record_cull(&self.gpu, encoder, &inputs, visible)?;
+        pyramid.hold_image(encoder);
+        Ok(())
     }
 
     /// Makes room for the instances that culls of `instances` may be restricted to; none at first.
@@ -113,7 +111,9 @@ impl HizContext {
         options: &CullOptions,
     ) -> Result<()> {
         let inputs = CullInputs::new(instances, camera, pyramid, options);
-        record_cull(&self.gpu, encoder, &CullInputs { among: Some(among), ..inputs }, visible)
+        record_cull(&self.gpu, encoder, &CullInputs { among: Some(among), ..inputs }, visible)?;
+        pyramid.hold_image(encoder);
+        Ok(())
     }
 
     /// Makes the buffers that take what culls for `views` views find, of 1..=[`MAX_VIEWS`].
@@ -192,7 +192,9 @@ impl HizContext {
         options: &CullOptions,
     ) -> Result<()> {
         let inputs = ViewsInputs { instances, views, among, options, idle: false, built: None };
-        record_cull_views(&self.gpu, encoder, &inputs, &visible.each(), visible.joined())
+        record_cull_views(&self.gpu, encoder, &inputs, &visible.each(), visible.joined())?;
+        views.iter().for_each(|view| view.pyramid.hold_image(encoder));
+        Ok(())
     }
 
     /// Makes the buffers of an approximate cull; `outputs` are those of what it keeps.
@@ -226,6 +228,8 @@ impl HizContext {
         negligible_px: u32,
     ) -> Result<()> {
         let inputs = CullInputs::new(instances, camera, pyramid, options);
-        record_cull_approximate(&self.gpu, encoder, &inputs, approximate, negligible_px)
+        record_cull_approximate(&self.gpu, encoder, &inputs, approximate, negligible_px)?;
+        pyramid.hold_image(encoder);
+        Ok(())
     }
 }

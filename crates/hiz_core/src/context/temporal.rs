@@ -159,6 +159,8 @@ impl HizContext {
         options: &CullOptions,
     ) -> Result<()> {
         let inputs = CullInputs::new(instances, camera, pyramid, options);
-        record_late(&self.gpu, encoder, &inputs, temporal)
+        record_late(&self.gpu, encoder, &inputs, temporal)?;
+        pyramid.hold_image(encoder);
+        Ok(())
     }
 }

@@ -434,6 +434,17 @@ impl Pyramid {
         }
     }
 
+    /// Keeps its image from being drawn again until the commands of `encoder` have run.
+    ///
+    /// An engine lends the images of its own again, and submits what it records at once.
+    /// The encoder of a caller may be submitted when pyramid and image are long gone.
+    pub(crate) fn hold_image(&self, encoder: &wgpu::CommandEncoder) {
+        if let Some(owner) = self.built().and_then(|built| built.owner) {
+            // An encoder that is never submitted drops this, too.
+            encoder.on_submitted_work_done(move || drop(owner));
+        }
+    }
+
     /// Notes that a reduction was recorded.
     pub(super) fn set_built(&self, built: Built) {
         // No later cull has the same view, since that contains the number of the reduction.
