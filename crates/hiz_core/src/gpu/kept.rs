@@ -122,7 +122,7 @@ impl Drop for RingShare {
     }
 }
 
-/// A buffer of a ring that several recordings copy from, in encoders of their own.
+/// A buffer of a ring that several recordings read or copy from, in encoders of their own.
 ///
 /// It comes back, mapped, once nobody holds it and each recording is done or dropped.
 #[derive(Debug)]

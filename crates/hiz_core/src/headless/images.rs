@@ -16,8 +16,9 @@ use crate::occluders::drawing::Rasteriser;
 
 /// Pixels of all kept images at most: one of 4K, or four of 1080p.
 ///
-/// A pixel takes 8 bytes on the device, up to 3 more where the host makes levels, and about 6 on
-/// the host.
+/// A pixel takes 4 bytes in the texture, and about 6 on the host where that one draws.
+/// It takes 4 more in a buffer through which rows come to the texture, or up to 6 in one that has
+/// levels, too; of each kind two are kept per image at most.
 const MOST_PIXELS: u64 = 1 << 23;
 
 /// The images of an engine that may be lent again, with the rasteriser that was asked for.
