@@ -9,7 +9,6 @@ const MAX_LEVELS: u32 = 16u;
 // Twin: `Level` in `crates/hiz_core/src/pyramid/levels.rs`.
 struct Level {
     // In words of the list; both are 0 for a level that is not stored.
-    // Level 0 has its place in the buffer of a host that makes all levels (`texels_buffer.wgsl`).
     offset: u32,
     stride: u32,
     width: u32,
@@ -19,7 +18,9 @@ struct Level {
 // Twin: `PyramidUniform` in `crates/hiz_core/src/pyramid/mod.rs`.
 struct Pyramid {
     levels: array<Level, MAX_LEVELS>,
-    // Where each level begins in an atlas.
+    // Column and row where each level begins in an atlas (`texels_atlas.wgsl`).
+    // Then its first word, and the words from row to row, in a buffer that has all levels
+    // (`texels_in_place.wgsl`).
     origins: array<vec4<u32>, MAX_LEVELS>,
     // A chunk holds 1 << chunk_shift words.
     chunk_shift: u32,

@@ -134,13 +134,13 @@ fn culls_find_what_they_find_in_an_uploaded_image() {
         let depth = held(engine, &triangles(engine, u64::from(width), 12), &camera);
         let first = pyramid(engine, &depth, StoredLevels::ALL);
         let is_large = width.max(height) > 1;
-        assert_eq!(first.is_in_one_buffer(), is_processor(engine) && is_large, "{width}x{height}");
+        assert_eq!(first.is_in_place(), is_processor(engine) && is_large, "{width}x{height}");
         let there = pyramid(engine, &uploaded(engine, &depth), StoredLevels::ALL);
         // One whose image has not come to its texture, as it has by now.
         drop((first, depth));
         let depth = held(engine, &triangles(engine, u64::from(width), 12), &camera);
         let here = pyramid(engine, &depth, StoredLevels::ALL);
-        assert!(!there.is_in_one_buffer());
+        assert!(!there.is_in_place());
         for kind in KINDS {
             let instances = instances(engine, kind, 300);
             // An engine brings the image to its texture before it counts pixels.
@@ -257,7 +257,7 @@ const READERS: [Reader; 13] = [
         let size = depth.size();
         let all = [0, 0, size.width - 1, size.height - 1];
         engine.renew_pyramid(&pyramid, depth, all).unwrap();
-        assert!(!pyramid.is_in_one_buffer());
+        assert!(!pyramid.is_in_place());
         let boxes = instances(engine, BoundsKind::Box, 2000);
         let (how, outputs) = (CullOptions::default(), Outputs::default());
         let culling = engine.cull(&boxes, depth.camera(), &pyramid, &how, &outputs).unwrap();
@@ -289,7 +289,7 @@ fn more_is_drawn_into_an_image_that_is_not_in_its_texture() {
     for is_reduced in [false, true] {
         let depth = held(engine, &first, &camera);
         if is_reduced {
-            assert_eq!(pyramid(engine, &depth, StoredLevels::ALL).is_in_one_buffer(), {
+            assert_eq!(pyramid(engine, &depth, StoredLevels::ALL).is_in_place(), {
                 is_processor(engine)
             });
         }
@@ -302,7 +302,7 @@ fn more_is_drawn_into_an_image_that_is_not_in_its_texture() {
         let there = uploaded(engine, &depth);
         let [here, there] = [&depth, &there].map(|depth| {
             let pyramid = pyramid(engine, depth, StoredLevels::ALL);
-            assert!(!pyramid.is_in_one_buffer());
+            assert!(!pyramid.is_in_place());
             (0..8).map(|k| bits(engine.read_level(&pyramid, k).unwrap())).collect::<Vec<_>>()
         });
         assert!(here == there, "{is_reduced}");

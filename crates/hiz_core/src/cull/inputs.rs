@@ -100,7 +100,7 @@ pub(super) struct BoundView {
     pub(super) groups: Option<wgpu::BindGroup>,
     numbers: Option<Numbers>,
     /// The buffer that is read in place of pyramid and image.
-    made: Option<Arc<Lent>>,
+    in_place: Option<Arc<Lent>>,
 }
 
 impl BoundView {
@@ -109,8 +109,8 @@ impl BoundView {
         if let Some(numbers) = self.numbers.take() {
             pyramid.view.record(encoder, numbers);
         }
-        if let Some(made) = &self.made {
-            made.read_by(encoder);
+        if let Some(buffer) = &self.in_place {
+            buffer.read_by(encoder);
         }
     }
 }
@@ -165,7 +165,7 @@ impl PreparedView {
         let store = if atlas.is_some() {
             DepthStore::Atlas
         } else if built.in_place.is_some() {
-            DepthStore::Made
+            DepthStore::InPlace
         } else {
             DepthStore::Apart(built.part.kind)
         };
@@ -200,7 +200,7 @@ impl PreparedView {
         let views = [self.view, ViewUniform { descent_budget, ..self.view }];
         let parts = views.each_ref().map(bytemuck::bytes_of);
         let texture = self.atlas.as_ref().unwrap_or(&self.built.source).clone();
-        let buffer = self.made().map(|made| made.buffer().clone());
+        let buffer = self.in_place().map(|lent| lent.buffer().clone());
         let key = (self.key.store.code(), texture, self.built.nearest.clone(), buffer);
         let bound = pyramid.view.bind(gpu, &key, &parts[..1 + usize::from(grouped)], |view| {
             self.create(gpu, pyramid, view)
@@ -208,13 +208,13 @@ impl PreparedView {
         let BoundParts { mut parts, numbers } = bound;
         let groups = parts.split_off(1).pop();
         let instances = parts.swap_remove(0);
-        Ok(BoundView { instances, groups, numbers, made: self.made().cloned() })
+        Ok(BoundView { instances, groups, numbers, in_place: self.in_place().cloned() })
     }
 
     /// The buffer that is read in place of pyramid and image, if no atlas is read.
-    fn made(&self) -> Option<&Arc<Lent>> {
+    fn in_place(&self) -> Option<&Arc<Lent>> {
         let in_place = self.built.in_place.as_ref().map(|all| &all.buffer);
-        in_place.filter(|_| self.key.store == DepthStore::Made)
+        in_place.filter(|_| self.key.store == DepthStore::InPlace)
     }
 
     fn create(
@@ -227,8 +227,8 @@ impl PreparedView {
         let chunks;
         if let Some(atlas) = &self.atlas {
             entries.push(entry(3, wgpu::BindingResource::TextureView(atlas)));
-        } else if let Some(made) = self.made() {
-            entries.push(entry(3, made.buffer().as_entire_binding()));
+        } else if let Some(lent) = self.in_place() {
+            entries.push(entry(3, lent.buffer().as_entire_binding()));
         } else {
             chunks = [pyramid.chunk(gpu, 0)?, pyramid.chunk(gpu, 1)?, pyramid.chunk(gpu, 2)?];
             entries.push(entry(0, wgpu::BindingResource::TextureView(&self.built.source)));

@@ -340,7 +340,7 @@ pub(crate) enum DepthStore {
     /// All levels from one texture.
     Atlas,
     /// All levels from the buffer in which the host has made them with the image.
-    Made,
+    InPlace,
 }
 
 /// Where a pass reads depth that reads none (`no_depth.rs`).
@@ -352,7 +352,7 @@ impl DepthStore {
         match self {
             Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
-            Self::Made => vec![wgsl!("pyramid/texels_buffer")],
+            Self::InPlace => vec![wgsl!("pyramid/texels_in_place")],
         }
     }
 
@@ -361,7 +361,7 @@ impl DepthStore {
         match self {
             Self::Apart(source) => source as u32,
             Self::Atlas => 6,
-            Self::Made => 7,
+            Self::InPlace => 7,
         }
     }
 
@@ -386,8 +386,8 @@ impl DepthStore {
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
             }
-            Self::Made => {
-                gpu.layout("hiz.cull.made_layout", &[(2, Uniform), (3, Read), (6, Uniform)])
+            Self::InPlace => {
+                gpu.layout("hiz.cull.in_place_layout", &[(2, Uniform), (3, Read), (6, Uniform)])
             }
         }
     }

@@ -128,7 +128,7 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
             [wgsl!("cull/pixels_row_sampled"), wgsl!("cull/pixels_row_apart")].to_vec()
         }
         DepthStore::Atlas => vec![wgsl!("cull/pixels_row_atlas")],
-        DepthStore::Made => vec![wgsl!("cull/pixels_row_buffer")],
+        DepthStore::InPlace => vec![wgsl!("cull/pixels_row_in_place")],
     };
     let alone: &[_] = match store {
         DepthStore::Apart(SourceKind::Pair) => &[],

@@ -55,7 +55,7 @@ pub(crate) struct Readers {
     pub(crate) instances: u32,
     pub(crate) footprint_log2: u32,
     /// Whether all levels are in the buffer in which the host has made them.
-    pub(crate) in_one_buffer: bool,
+    pub(crate) in_place: bool,
 }
 
 /// The texture of an atlas, and what it is known to hold.
@@ -97,10 +97,10 @@ impl AtlasUse {
     /// saves for a footprint of 2x2 where all levels are in one buffer (`docs/performance.md`).
     pub(crate) fn pays(self, layout: &PyramidLayout, readers: Readers) -> bool {
         let copied = layout.size.pixels() + layout.texels;
-        let Readers { instances, footprint_log2, in_one_buffer } = readers;
+        let Readers { instances, footprint_log2, in_place } = readers;
         let instances = u64::from(instances);
         match self {
-            Self::Auto if in_one_buffer => instances << (2 * footprint_log2) >= 2 * copied,
+            Self::Auto if in_place => instances << (2 * footprint_log2) >= 2 * copied,
             Self::Auto => 4 * instances >= copied,
             Self::Always => true,
             Self::Never => false,
@@ -139,8 +139,8 @@ impl Atlas {
     /// Records the copies of all levels, and of two headers.
     ///
     /// What is copied is settled at different times.
-    /// For the depth image that is now; for the stored levels it is when the copies run, which may
-    /// be after the next reduction.
+    /// For the depth image, and for levels in place, that is now; for other stored levels it is when
+    /// the copies run, which may be after the next reduction.
     /// A header therefore goes with each.
     /// A cull keeps everything if either header differs from the reduction that it expects.
     pub(crate) fn record(

@@ -66,6 +66,7 @@ use crate::pyramid::steps::Steps;
 #[repr(C)]
 pub(crate) struct PyramidUniform {
     pub(crate) levels: [Level; MAX_LEVELS],
+    /// Column and row in an atlas; offset and stride where all levels are in place.
     pub(crate) origins: [[u32; 4]; MAX_LEVELS],
     pub(crate) chunk_shift: u32,
     pub(crate) first_stored: u32,
@@ -213,8 +214,12 @@ impl Pyramid {
             .collect::<Result<_>>()?;
         let mut levels = [Level { offset: 0, stride: 0, width: 0, height: 0 }; MAX_LEVELS];
         levels[..layout.levels.len()].copy_from_slice(&layout.levels);
-        levels[0] = layout.image().unwrap_or(levels[0]);
-        let (StoredLevels { first, last }, origins) = (layout.stored, layout.atlas.origins);
+        let mut origins = layout.atlas.origins;
+        let in_place = layout.image().into_iter().chain(layout.levels.iter().skip(1).copied());
+        for (origin, Level { offset, stride, .. }) in origins.iter_mut().zip(in_place) {
+            origin[2..].copy_from_slice(&[offset, stride]);
+        }
+        let StoredLevels { first, last } = layout.stored;
         let uniform = gpu.uniform(
             "hiz.pyramid.layout",
             &PyramidUniform {
@@ -301,8 +306,8 @@ impl Pyramid {
         built: &Built,
         (instances, footprint_log2): (u32, u32),
     ) -> bool {
-        let in_one_buffer = built.in_place.is_some();
-        self.atlas_use.pays(&self.layout, Readers { instances, footprint_log2, in_one_buffer })
+        let in_place = built.in_place.is_some();
+        self.atlas_use.pays(&self.layout, Readers { instances, footprint_log2, in_place })
             && !self.no_atlas.load(Ordering::Relaxed)
             && atlas::is_possible(&self.layout, &built.part, gpu.limits())
     }
@@ -415,7 +420,7 @@ impl Pyramid {
 
     /// Whether culls may read all levels and the image in the buffer that the host has written.
     #[cfg(feature = "testing")]
-    pub fn is_in_one_buffer(&self) -> bool {
+    pub fn is_in_place(&self) -> bool {
         self.built().is_some_and(|built| built.in_place.is_some())
     }
 

@@ -125,7 +125,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
                 .map(|(name, m)| (format!("{name} {source:?}"), m)),
         );
     }
-    let others = [DepthStore::Atlas, DepthStore::Made];
+    let others = [DepthStore::Atlas, DepthStore::InPlace];
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain(others);
     // The sets of an early pass differ in a constant, and in what is decided.
     let early = [Candidates::History, Candidates::Size]

@@ -3,7 +3,7 @@
 // The farthest depths of the texels 4 q to 4 q + 3 of row y.
 fn texel_row(level: u32, q: u32, y: u32) -> vec4<u32> {
     let at = row_of(level, y) + VECTOR * q;
-    return vec4<u32>(made[at], made[at + 1u], made[at + 2u], made[at + 3u]);
+    return vec4<u32>(words[at], words[at + 1u], words[at + 2u], words[at + 3u]);
 }
 
 // Nothing is known of their nearest depths.
