@@ -156,9 +156,7 @@ impl PreparedView {
         check_shadow_options(options)?;
         check_coverage(&built, options)?;
         Pyramid::check_source(gpu, &built)?;
-        let readers = (instances.len(), options.footprint.log2());
-        let wants_atlas = pyramid.wants_atlas(gpu, &built, readers);
-        let atlas = match encoder.filter(|_| wants_atlas) {
+        let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
             Some(encoder) => pyramid.record_atlas(gpu, encoder, &built)?,
             None => None,
         };

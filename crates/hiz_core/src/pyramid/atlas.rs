@@ -39,23 +39,12 @@ pub enum AtlasUse {
     /// Where a cull has enough instances for the copy to pay.
     ///
     /// That takes a quarter as many instances as the depth image and the stored levels have texels.
-    /// Where culls can read all of them in the buffer in which the host has made them, it takes half
-    /// as many instances with a footprint of 2x2, and with a larger one fewer.
     #[default]
     Auto,
     /// Whatever the number of instances.
     Always,
     /// Never: no copy, and no memory for it.
     Never,
-}
-
-/// What a cull reads without an atlas.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Readers {
-    pub(crate) instances: u32,
-    pub(crate) footprint_log2: u32,
-    /// Whether all levels are in the buffer in which the host has made them.
-    pub(crate) in_place: bool,
 }
 
 /// The texture of an atlas, and what it is known to hold.
@@ -93,15 +82,11 @@ pub(crate) fn travels(format: wgpu::TextureFormat) -> bool {
 impl AtlasUse {
     /// Whether culls of `instances` instances ask for an atlas.
     ///
-    /// Copying a pixel costs about a quarter of what the atlas saves per instance, or half of what it
-    /// saves for a footprint of 2x2 where all levels are in one buffer (`docs/performance.md`).
-    pub(crate) fn pays(self, layout: &PyramidLayout, readers: Readers) -> bool {
-        let copied = layout.size.pixels() + layout.texels;
-        let Readers { instances, footprint_log2, in_place } = readers;
-        let instances = u64::from(instances);
+    /// Copying a pixel costs about a quarter of what the atlas saves per instance
+    /// (`docs/performance.md`).
+    pub(crate) fn pays(self, layout: &PyramidLayout, instances: u32) -> bool {
         match self {
-            Self::Auto if in_place => instances << (2 * footprint_log2) >= 2 * copied,
-            Self::Auto => 4 * instances >= copied,
+            Self::Auto => 4 * u64::from(instances) >= layout.size.pixels() + layout.texels,
             Self::Always => true,
             Self::Never => false,
         }

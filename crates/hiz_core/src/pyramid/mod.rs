@@ -53,7 +53,7 @@ use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
-use crate::pyramid::atlas::{Atlas, AtlasUse, Readers};
+use crate::pyramid::atlas::{Atlas, AtlasUse};
 use crate::pyramid::built::{Built, Owner};
 use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::{PYRAMID_CHUNKS, PyramidLayout, chunk_shift};
@@ -296,18 +296,12 @@ impl Pyramid {
         self.chunks.iter().map(wgpu::Buffer::size).sum::<u64>() + atlas
     }
 
-    /// Whether a cull reads an atlas: where one is possible, and pays.
+    /// Whether culls of `instances` instances read an atlas: where one is possible, and pays.
     ///
     /// `built` is what the cull is against.
     /// The pyramid may meanwhile be built from another kind of image.
-    pub(crate) fn wants_atlas(
-        &self,
-        gpu: &Gpu,
-        built: &Built,
-        (instances, footprint_log2): (u32, u32),
-    ) -> bool {
-        let in_place = built.in_place.is_some();
-        self.atlas_use.pays(&self.layout, Readers { instances, footprint_log2, in_place })
+    pub(crate) fn wants_atlas(&self, gpu: &Gpu, built: &Built, instances: u32) -> bool {
+        self.atlas_use.pays(&self.layout, instances)
             && !self.no_atlas.load(Ordering::Relaxed)
             && atlas::is_possible(&self.layout, &built.part, gpu.limits())
     }
