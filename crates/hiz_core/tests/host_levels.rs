@@ -5,12 +5,12 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{BLOCK_SIZES, CONVENTIONS, Random, camera_along_z, engine};
+use common::{BLOCK_SIZES, CONVENTIONS, Random, camera_along_z, engine, occluders, wall};
 use hiz_core::headless::Engine;
 use hiz_core::{
     AtlasUse, Bounds, Camera, CullOptions, DepthConvention, DepthLoad, DepthSource, Depths,
-    DrawOptions, Floats, ImageSize, InstanceOptions, Instances, MeshData, OccluderDepth,
-    OccluderOptions, Occluders, Pyramid, PyramidOptions, Rasteriser, StoredLevels, wgpu,
+    DrawOptions, Floats, ImageSize, InstanceOptions, Instances, OccluderDepth, Occluders, Pyramid,
+    PyramidOptions, Rasteriser, StoredLevels, wgpu,
 };
 
 /// Triangles at random places of the image, also across its edges.
@@ -28,17 +28,6 @@ fn triangles(engine: &Engine, seed: u64, count: u32) -> Arc<Occluders> {
     }
     let all: Vec<u32> = (0..3 * count).collect();
     occluders(engine, &vertices, &all)
-}
-
-fn occluders(engine: &Engine, vertices: &[f64], triangles: &[u32]) -> Arc<Occluders> {
-    let mesh = MeshData { vertices: Floats::F64(vertices), triangles, transforms: None };
-    engine.occluders(&[mesh], &OccluderOptions::default()).unwrap()
-}
-
-/// A square at depth `z` that fills the image of [`camera_along_z`].
-fn wall(engine: &Engine, z: f64) -> Arc<Occluders> {
-    let r = 2.0 * z;
-    occluders(engine, &[-r, -r, z, r, -r, z, r, r, z, -r, r, z], &[0, 1, 2, 0, 2, 3])
 }
 
 fn encoder(engine: &Engine) -> wgpu::CommandEncoder {

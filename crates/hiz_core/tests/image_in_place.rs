@@ -8,25 +8,14 @@ mod common;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use common::{BLOCK_SIZES, CONVENTIONS, Random, camera_along_z, engine, words_of};
+use common::{BLOCK_SIZES, CONVENTIONS, Random, camera_along_z, engine, occluders, wall, words_of};
 use hiz_core::headless::{Culling, DepthImage, Engine};
 use hiz_core::{
     AtlasUse, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, DepthLoad,
-    Depths, DrawOptions, Fit, Floats, Footprint, InstanceOptions, Instances, MeshData, MipDepths,
-    MipOptions, OccluderDepth, OccluderOptions, Occluders, Outputs, Pyramid, PyramidOptions,
-    Rasteriser, ReceiverMaskOptions, StoredLevels, wgpu,
+    Depths, DrawOptions, Fit, Floats, Footprint, InstanceOptions, Instances, MipDepths, MipOptions,
+    OccluderDepth, Occluders, Outputs, Pyramid, PyramidOptions, Rasteriser, ReceiverMaskOptions,
+    StoredLevels, wgpu,
 };
-
-fn occluders(engine: &Engine, vertices: &[f64], triangles: &[u32]) -> Arc<Occluders> {
-    let mesh = MeshData { vertices: Floats::F64(vertices), triangles, transforms: None };
-    engine.occluders(&[mesh], &OccluderOptions::default()).unwrap()
-}
-
-/// A square at depth `z` that fills the image of [`camera_along_z`].
-fn wall(engine: &Engine, z: f64) -> Arc<Occluders> {
-    let r = 2.0 * z;
-    occluders(engine, &[-r, -r, z, r, -r, z, r, r, z, -r, r, z], &[0, 1, 2, 0, 2, 3])
-}
 
 /// Triangles at random places of the image.
 fn triangles(engine: &Engine, seed: u64, count: u32) -> Arc<Occluders> {

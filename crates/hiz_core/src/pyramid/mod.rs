@@ -215,7 +215,8 @@ impl Pyramid {
         let mut levels = [Level { offset: 0, stride: 0, width: 0, height: 0 }; MAX_LEVELS];
         levels[..layout.levels.len()].copy_from_slice(&layout.levels);
         let mut origins = layout.atlas.origins;
-        let in_place = layout.image().into_iter().chain(layout.levels.iter().skip(1).copied());
+        let mut in_place = levels;
+        in_place[0] = layout.image().unwrap_or(levels[0]);
         for (origin, Level { offset, stride, .. }) in origins.iter_mut().zip(in_place) {
             origin[2..].copy_from_slice(&[offset, stride]);
         }

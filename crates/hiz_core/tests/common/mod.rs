@@ -6,7 +6,9 @@ use std::cell::OnceCell;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use hiz_core::headless::Engine;
-use hiz_core::{Camera, DepthConvention, ImageSize, Mat4, wgpu};
+use hiz_core::{
+    Camera, DepthConvention, Floats, ImageSize, Mat4, MeshData, OccluderOptions, Occluders, wgpu,
+};
 
 /// Sizes at which the blocks of a reduction begin and end, as width and height.
 /// There are single pixels, rows, columns, powers of two and their neighbours, and primes.
@@ -100,6 +102,18 @@ pub(crate) fn words_of(engine: &Engine, buffer: &wgpu::Buffer) -> Vec<u32> {
     });
     engine.wait().unwrap();
     answer.recv().unwrap()
+}
+
+/// A mesh that hides, uploaded.
+pub(crate) fn occluders(engine: &Engine, vertices: &[f64], triangles: &[u32]) -> Arc<Occluders> {
+    let mesh = MeshData { vertices: Floats::F64(vertices), triangles, transforms: None };
+    engine.occluders(&[mesh], &OccluderOptions::default()).unwrap()
+}
+
+/// A square at depth `z` that fills the image of [`camera_along_z`].
+pub(crate) fn wall(engine: &Engine, z: f64) -> Arc<Occluders> {
+    let r = 2.0 * z;
+    occluders(engine, &[-r, -r, z, r, -r, z, r, r, z, -r, r, z], &[0, 1, 2, 0, 2, 3])
 }
 
 /// A depth image of a test: one layer, one mip level, one sample.
