@@ -158,6 +158,29 @@ fn culls_find_what_they_find_in_an_uploaded_image() {
     assert!(hidden > count / 10, "{hidden} of {count} are hidden");
 }
 
+/// Culls in place read rows where they lie: with a row in the wrong place the masks differ.
+#[test]
+fn a_planted_row_is_seen() {
+    let fault = ("place.x + y * place.y", "place.x + (y / 2u) * place.y");
+    let engine = &Engine::with_planted_faults(None, &[fault]).unwrap();
+    if !is_processor(engine) {
+        eprintln!("skipped: on a GPU no cull reads in place");
+        return;
+    }
+    let camera = camera_along_z(333, 70, DepthConvention::Reversed);
+    let depth = held(engine, &triangles(engine, 333, 12), &camera);
+    let here = pyramid(engine, &depth, StoredLevels::ALL);
+    assert!(here.is_in_place());
+    let there = pyramid(engine, &uploaded(engine, &depth), StoredLevels::ALL);
+    let boxes = instances(engine, BoundsKind::Box, 300);
+    let [here, there] = [&here, &there].map(|pyramid| {
+        let (how, outputs) = (CullOptions::default(), Outputs::default());
+        engine.cull(&boxes, &camera, pyramid, &how, &outputs).unwrap().mask().unwrap()
+    });
+    let lost = there.iter().zip(&here).filter(|(seen, kept)| **seen && !**kept).count();
+    assert!(lost > 0, "no visible box was lost");
+}
+
 /// The bits that a reader finds, of an image and of the same pixels in an uploaded one.
 type Reader = (&'static str, fn(&Engine, &DepthImage) -> Vec<u32>);
 
